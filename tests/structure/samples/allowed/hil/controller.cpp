@@ -1,0 +1,2 @@
+#include "files.hpp"
+#include "store.hpp"

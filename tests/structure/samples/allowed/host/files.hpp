@@ -1,0 +1,3 @@
+#pragma once
+#include <flexcomp/core.hpp>
+#include <vector>
