@@ -1,0 +1,210 @@
+/// \file
+/// CANopen object dictionary (CiA 301). The records and commands are described in store_state.hpp, all
+/// little-endian.
+///
+///     index  sub  type            access  what
+///     0x1000   0  UNSIGNED32      const   device type: 0, no standard profile
+///     0x1001   0  UNSIGNED8       ro      error register: bit 0 where a fault bit of the status record is
+///     set 0x1008   0  VISIBLE_STRING  const   manufacturer device name, "flexcomp" 0x100A   0 VISIBLE_STRING
+///     const   manufacturer software version 0x1010   0  UNSIGNED8       const   1
+///              1  UNSIGNED32      rw      "save" (0x65766173): commit what is staged; reads 1
+///     0x1011   0  UNSIGNED8       const   1
+///              1  UNSIGNED32      rw      "load" (0x64616F6C): restore_defaults; reads 1
+///     0x1017   0  UNSIGNED16      rw      producer heartbeat time, ms; 0: none
+///     0x1018   0  UNSIGNED8       const   4
+///              1  UNSIGNED32      ro      vendor id (0: none assigned)
+///              2  UNSIGNED32      ro      product code
+///              3  UNSIGNED32      ro      revision: firmware (major << 16 | minor << 8 | patch)
+///              4  UNSIGNED32      ro      serial number: the first four bytes of the name hash
+///     0x1200   0  UNSIGNED8       const   2
+///              1  UNSIGNED32      ro      COB-ID of requests, 0x600 + node
+///              2  UNSIGNED32      ro      COB-ID of answers, 0x580 + node
+///     0x2000   0  DOMAIN          ro      capability record
+///     0x2001   0  DOMAIN          ro      status record
+///     0x2002   0  UNSIGNED8       const   7: the status for people
+///              1  UNSIGNED16      ro      state (wire::StoreState)
+///              2  UNSIGNED16      ro      answer to the last command (wire::Answer)
+///              3  UNSIGNED16      ro      refusal of the last command (flexcomp::Refusal)
+///              4  UNSIGNED16      ro      faults
+///              5  UNSIGNED32      ro      sequence of the active set
+///              6  UNSIGNED32      ro      detail
+///              7  UNSIGNED32      ro      control cycles until a trial reverts
+///     0x2010   0  UNSIGNED8       const   2
+///              1  DOMAIN          wo      image into staging
+///              2  DOMAIN          ro      active image, byte for byte
+///     0x2011   0  UNSIGNED8       const   2
+///              1  UNSIGNED32      rw      argument of the next command
+///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads back the last
+///              one
+///     0x2020   0  UNSIGNED8       const   2
+///              1  DOMAIN          rw      probe request record; its download answers it
+///              2  DOMAIN          ro      probe response record
+///     0x2021   0  UNSIGNED8       const   7: for people
+///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
+///              7  REAL32          ro      largest correction of any joint since the start, deg
+///
+/// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length,
+/// otherwise the
+///   length is known at the end. It goes to staging only; an aborted or timed-out transfer leaves nothing
+///   behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
+/// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
+/// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by the fade-in,
+/// because
+///   between the two a controller would run a set that it can no longer read back.
+/// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
+/// with
+///   0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).
+#ifndef FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
+#define FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
+
+#include <cstdint>
+
+#include "flexcomp/status.hpp"
+#include "flexcomp/wire/store_state.hpp"
+
+namespace flexcomp {
+namespace wire {
+namespace canopen {
+
+constexpr std::uint16_t device_type = 0x1000;
+constexpr std::uint16_t error_register = 0x1001;
+constexpr std::uint16_t device_name = 0x1008;
+constexpr std::uint16_t software_version = 0x100A;
+constexpr std::uint16_t store_parameters = 0x1010;
+constexpr std::uint16_t restore_parameters = 0x1011;
+constexpr std::uint16_t heartbeat_time = 0x1017;
+constexpr std::uint16_t identity = 0x1018;
+constexpr std::uint16_t sdo_server = 0x1200;
+constexpr std::uint16_t capability = 0x2000;
+constexpr std::uint16_t status = 0x2001;
+constexpr std::uint16_t status_for_people = 0x2002;
+constexpr std::uint16_t image = 0x2010;
+constexpr std::uint8_t image_staging = 1;
+constexpr std::uint8_t image_active = 2;
+constexpr std::uint16_t command = 0x2011;
+constexpr std::uint8_t command_argument = 1;
+constexpr std::uint8_t command_number = 2;
+constexpr std::uint16_t probe = 0x2020;
+constexpr std::uint8_t probe_request = 1;
+constexpr std::uint8_t probe_response = 2;
+constexpr std::uint16_t people = 0x2021;
+
+constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2.13
+constexpr std::uint32_t load_signature = 0x64616F6C;  ///< "load", CiA 301 7.5.2.14
+constexpr std::uint32_t product_code = 0x464C5831;    ///< "FLX1"
+
+// COB-IDs of the pre-defined connection set (CiA 301, 7.3.5).
+constexpr std::uint16_t nmt_id = 0x000;
+constexpr std::uint16_t sdo_answer_id = 0x580;   ///< + node, server to client
+constexpr std::uint16_t sdo_request_id = 0x600;  ///< + node, client to server
+constexpr std::uint16_t heartbeat_id = 0x700;    ///< + node
+
+/// NMT commands (CiA 301, 7.2.8.3.1).
+enum class NmtCommand : std::uint8_t {
+  start = 1,
+  stop = 2,
+  enter_pre_operational = 128,
+  reset_node = 129,
+  reset_communication = 130,
+};
+
+/// NMT states as in the heartbeat (CiA 301, 7.2.8.3.2.2).
+enum class NmtState : std::uint8_t {
+  initialising = 0,  ///< also the boot-up message
+  stopped = 4,
+  operational = 5,
+  pre_operational = 127,
+};
+
+/// SDO abort codes (CiA 301, table 22).
+namespace abort {
+constexpr std::uint32_t none = 0;
+constexpr std::uint32_t toggle = 0x05030000;
+constexpr std::uint32_t timeout = 0x05040000;
+constexpr std::uint32_t command = 0x05040001;
+constexpr std::uint32_t out_of_memory = 0x05040005;
+constexpr std::uint32_t write_only = 0x06010001;
+constexpr std::uint32_t read_only = 0x06010002;
+constexpr std::uint32_t no_object = 0x06020000;
+constexpr std::uint32_t incompatible = 0x06040043;
+constexpr std::uint32_t hardware = 0x06060000;
+constexpr std::uint32_t length = 0x06070010;
+constexpr std::uint32_t too_long = 0x06070012;
+constexpr std::uint32_t too_short = 0x06070013;
+constexpr std::uint32_t no_sub_index = 0x06090011;
+constexpr std::uint32_t value = 0x06090030;
+constexpr std::uint32_t value_too_high = 0x06090031;
+constexpr std::uint32_t value_too_low = 0x06090032;
+constexpr std::uint32_t busy = 0x060A0023;
+constexpr std::uint32_t general = 0x08000000;
+constexpr std::uint32_t not_stored = 0x08000020;
+constexpr std::uint32_t local_control = 0x08000021;
+constexpr std::uint32_t device_state = 0x08000022;
+constexpr std::uint32_t no_data = 0x08000024;
+}  // namespace abort
+
+/// The abort code that says a refusal on this bus.
+inline std::uint32_t abort_code(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::none:
+      return abort::none;
+    case Refusal::truncated:
+      return abort::too_short;
+    case Refusal::bad_length:
+    case Refusal::too_long:
+      return abort::too_long;
+    case Refusal::checksum:
+      return abort::not_stored;
+    case Refusal::bad_magic:
+    case Refusal::schema:
+    case Refusal::wrong_robot:
+    case Refusal::wrong_nominal:
+    case Refusal::unknown_record:
+    case Refusal::unknown_basis:
+    case Refusal::bad_place:
+    case Refusal::mounting:
+      return abort::incompatible;
+    case Refusal::bad_value:
+      return abort::value;
+    case Refusal::too_many_terms:
+    case Refusal::table_too_large:
+      return abort::out_of_memory;
+    case Refusal::implausible:
+      return abort::value_too_high;
+    case Refusal::stale_sequence:
+      return abort::value_too_low;
+  }
+  return abort::general;
+}
+
+/// The abort code that says the answer to a command on this bus; `refusal` where the answer is `refused`.
+inline std::uint32_t abort_code(Answer answer, Refusal refusal) {
+  switch (answer) {
+    case Answer::accepted:
+      return abort::none;
+    case Answer::refused:
+      return abort_code(refusal);
+    case Answer::wrong_state:
+    case Answer::no_previous:
+    case Answer::reverted:
+      return abort::device_state;
+    case Answer::busy:
+      return abort::busy;
+    case Answer::not_authorised:
+      return abort::local_control;
+    case Answer::storage_failed:
+      return abort::hardware;
+    case Answer::incomplete:
+      return abort::too_short;
+    case Answer::unknown_command:
+    case Answer::bad_argument:
+      return abort::value;
+  }
+  return abort::general;
+}
+
+}  // namespace canopen
+}  // namespace wire
+}  // namespace flexcomp
+
+#endif

@@ -1,0 +1,345 @@
+/// \file
+/// What controller and host say to each other about the parameter store, the same on every bus: the numbers
+/// of states, commands and answers, and four records. How a bus carries them is in modbus_map.hpp and
+/// canopen_objects.hpp.
+///
+/// A record is a sequence of fields without gaps, every field an even number of bytes. On Modbus a field is
+/// big-endian in consecutive registers (a binary64 takes four, most significant first, "ABCD EFGH"); on
+/// CANopen it is little-endian. Offsets in bytes are thus the same on both; a register offset is half of it.
+/// Hashes are bytes in order on both. Reals are binary64 in SI units and travel as bits, so that what the
+/// host sends is what the controller computes with, to the last bit.
+///
+///     capability, 128 bytes                       status, 96 bytes
+///       0 u16 protocol (major << 8 | minor)         0 u16 state (StoreState)
+///       2 u16 joints                                2 u16 answer to the last command (Answer)
+///       4 u16 bytes of the scalar: 4, 8             4 u16 refusal of the last command (flexcomp::Refusal)
+///       6 u16 image schema (major << 8 | minor)     6 u16 faults (bits, namespace fault)
+///       8 u32 bases, bit 1 << id                    8 u32 detail of the refusal or answer
+///      12 u32 flags, 0                             12 u16 slot of the active set: 0, 1, or 0xFFFF for none
+///      16 u16 terms that are not constant          14 u16 1: the control cycle runs what is requested
+///      18 u16 tables                               16 u32 sequence of the active set, 0 for none
+///      20 u32 table values                         20 u32 bytes of the active image
+///      24 u32 longest image, bytes                 24 u32 CRC-32 of the active image (its last word)
+///      28 u32 control cycle, us                    28 u32 sequence that rollback returns to, 0 for none
+///      32 u32 fade-in, control cycles              32 u32 bytes announced for the staged image
+///      36 u32 firmware (major<<16|minor<<8|patch)  36 u32 bytes staged so far
+///      40 nominal hash, 32 bytes                   40 u32 control cycles until a trial reverts, 0: no trial
+///      72 hash of the robot's name, 32 bytes       44 u32 control cycles since the start (wraps)
+///     104 f64 plausible position change, m         48 u32 x 6 control cycles by StepStatus 0 … 5 (wrap)
+///     112 f64 plausible orientation change, rad    72 u16 StepStatus of the last control cycle
+///     120 f64 largest correction of a joint, rad   74 22 bytes 0, reserved
+///     probe request, 216 bytes                    probe response, 72 bytes
+///       0 f64 x 6 joint command, rad                0 f64 x 6 corrected joint command, rad
+///      48 f64 payload mass, kg                     48 f64 position that is still missed, m
+///      56 f64 x 3 its centre of mass in F6, m      56 f64 orientation that is still missed, rad
+///      80 f64 x 3 external force in F0, N          64 u16 StepStatus
+///     104 f64 temperature, deg C                   66 u16 slot of the set that answered, 0xFFFF for none
+///     112 f64 time, s                              68 u32 sequence of that set, 0 for none
+///     120 f64 x 6 direction of joint (+1, -1, 0)
+///     168 f64 x 6 relative speed of joint
+///
+/// Where the probe's status is `no_set` or `refused` the command
+/// comes back unchanged and both residuals are 0.
+///
+/// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). Commands
+/// that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
+/// when they are accepted and then run in the background: the state is `working` until they end, and answer,
+/// refusal and detail then tell how. A client polls the status until the state is no longer `working`.
+#ifndef FLEXCOMP_WIRE_STORE_STATE_HPP
+#define FLEXCOMP_WIRE_STORE_STATE_HPP
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/bytes.hpp"
+
+namespace flexcomp {
+namespace wire {
+
+/// What this header describes. A host refuses another major number; a higher minor number only adds.
+constexpr std::uint16_t protocol_version = 0x0100;
+constexpr std::size_t joints = 6;
+
+/// The store, as seen by whoever brings a set. Numbers are on the wire: add, never change.
+enum class StoreState : std::uint16_t {
+  idle = 0,       ///< nothing staged
+  receiving = 1,  ///< bytes are coming in
+  verified = 2,   ///< staged in full, checked and prepared; waits for commit
+  working = 3,    ///< non-volatile memory is being written
+  trial = 4,      ///< a committed set runs on trial: confirm it or it reverts by itself
+};
+
+/// Commands, with their argument (u32; 0 where none is named). Numbers are on the wire: add, never change.
+enum class Command : std::uint16_t {
+  none = 0,
+  begin = 1,   ///< announces an image; argument: its length in bytes
+  verify = 2,  ///< checks the staged image and prepares it
+  commit =
+      3,  ///< writes it to the inactive slot and makes it active (verifies first where that was left out)
+  commit_trial = 4,  ///< the same, but reverts unless confirmed; argument: control cycles, 0 = as configured
+  confirm = 5,       ///< makes the set on trial permanent
+  rollback = 6,      ///< back to the set in the other slot (or out of the trial); the dropped slot is erased
+  abort = 7,         ///< drops what is staged
+  restore_defaults = 8,  ///< erases both slots; commands are passed through from then on
+};
+
+/// How the last command ended. Numbers are on the wire: add, never change.
+enum class Answer : std::uint16_t {
+  accepted = 0,
+  refused = 1,      ///< the image was refused; `refusal` says why
+  wrong_state = 2,  ///< not in this state of the store
+  busy = 3,  ///< another client's transfer, a write in progress, or the cycle has not taken the last set yet
+  not_authorised = 4,  ///< by local control
+  storage_failed = 5,  ///< non-volatile memory could not be erased, written or read back
+  incomplete = 6,      ///< fewer bytes were staged than announced; detail: how many
+  no_previous = 7,     ///< nothing to roll back to
+  unknown_command = 8,
+  bad_argument = 9,  ///< length 0, or bytes that leave a gap or exceed the announced length
+  reverted = 10,     ///< the trial ran out before it was confirmed
+};
+
+/// Bits of the status field `faults`: what a technician should know, none of them stops the robot.
+namespace fault {
+constexpr std::uint16_t no_valid_set = 1;  ///< no slot held a set that this controller accepts: pass-through
+constexpr std::uint16_t older_slot = 2;    ///< the newest slot was damaged or refused; the other one runs
+constexpr std::uint16_t storage = 4;       ///< non-volatile memory failed to read, erase or write
+constexpr std::uint16_t trial_reverted = 8;  ///< a set on trial was not confirmed in time
+}  // namespace fault
+
+constexpr std::uint16_t no_slot = 0xFFFF;
+
+/// What the controller is and holds; see the table at the top.
+struct Capability {
+  std::uint16_t protocol = protocol_version;
+  std::uint16_t joints = 0;
+  std::uint16_t scalar_bytes = 0;
+  std::uint16_t schema = 0;
+  std::uint32_t bases = 0;
+  std::uint32_t flags = 0;
+  std::uint16_t terms = 0;
+  std::uint16_t tables = 0;
+  std::uint32_t values = 0;
+  std::uint32_t image_bytes = 0;
+  std::uint32_t cycle_us = 0;
+  std::uint32_t fade_cycles = 0;
+  std::uint32_t firmware = 0;
+  std::array<std::uint8_t, 32> nominal_hash{};
+  std::array<std::uint8_t, 32> name_hash{};
+  std::uint64_t plausible_position_m = 0;       ///< binary64 bits
+  std::uint64_t plausible_orientation_rad = 0;  ///< binary64 bits
+  std::uint64_t largest_correction_rad = 0;     ///< binary64 bits
+};
+constexpr std::size_t capability_bytes = 128;
+
+/// What the store and the control cycle are doing; see the table at the top.
+struct Status {
+  std::uint16_t state = 0;
+  std::uint16_t answer = 0;
+  std::uint16_t refusal = 0;
+  std::uint16_t faults = 0;
+  std::uint32_t detail = 0;
+  std::uint16_t active_slot = no_slot;
+  std::uint16_t settled = 0;
+  std::uint32_t active_sequence = 0;
+  std::uint32_t active_bytes = 0;
+  std::uint32_t active_crc = 0;
+  std::uint32_t previous_sequence = 0;
+  std::uint32_t announced_bytes = 0;
+  std::uint32_t staged_bytes = 0;
+  std::uint32_t trial_cycles_left = 0;
+  std::uint32_t cycles = 0;
+  std::array<std::uint32_t, 6> cycles_by_status{};
+  std::uint16_t last_status = 0;
+};
+constexpr std::size_t status_bytes = 96;
+
+/// One joint command and its context, as binary64 bits.
+struct ProbeRequest {
+  std::array<std::uint64_t, joints> q_rad{};
+  std::uint64_t payload_kg = 0;
+  std::array<std::uint64_t, 3> payload_com_m{};
+  std::array<std::uint64_t, 3> force_n{};
+  std::uint64_t temperature_c = 0;
+  std::uint64_t time_s = 0;
+  std::array<std::uint64_t, joints> direction{};
+  std::array<std::uint64_t, joints> relative_speed{};
+};
+constexpr std::size_t probe_request_bytes = 216;
+
+/// What the controller answers; reals as binary64 bits.
+struct ProbeResponse {
+  std::array<std::uint64_t, joints> q_rad{};
+  std::uint64_t position_m = 0;
+  std::uint64_t orientation_rad = 0;
+  std::uint16_t status = 0;
+  std::uint16_t slot = no_slot;
+  std::uint32_t sequence = 0;
+};
+constexpr std::size_t probe_response_bytes = 72;
+
+/// The order of the bytes of a field: CANopen little, Modbus big.
+enum class ByteOrder { little, big };
+
+namespace detail {
+
+/// Walks over the fields of a record in the order of the tables above. The one place that knows it.
+template <class Record, class Visitor>
+void visit_capability(Record& r, Visitor&& v) {
+  v(r.protocol), v(r.joints), v(r.scalar_bytes), v(r.schema), v(r.bases), v(r.flags), v(r.terms), v(r.tables);
+  v(r.values), v(r.image_bytes), v(r.cycle_us), v(r.fade_cycles), v(r.firmware);
+  v.bytes(r.nominal_hash.data(), 32), v.bytes(r.name_hash.data(), 32);
+  v(r.plausible_position_m), v(r.plausible_orientation_rad), v(r.largest_correction_rad);
+}
+
+template <class Record, class Visitor>
+void visit_status(Record& r, Visitor&& v) {
+  v(r.state), v(r.answer), v(r.refusal), v(r.faults), v(r.detail), v(r.active_slot), v(r.settled);
+  v(r.active_sequence), v(r.active_bytes), v(r.active_crc), v(r.previous_sequence), v(r.announced_bytes);
+  v(r.staged_bytes), v(r.trial_cycles_left), v(r.cycles);
+  for (auto& n : r.cycles_by_status) v(n);
+  v(r.last_status), v.skip(22);
+}
+
+template <class Record, class Visitor>
+void visit_probe_request(Record& r, Visitor&& v) {
+  for (auto& q : r.q_rad) v(q);
+  v(r.payload_kg);
+  for (auto& x : r.payload_com_m) v(x);
+  for (auto& f : r.force_n) v(f);
+  v(r.temperature_c), v(r.time_s);
+  for (auto& d : r.direction) v(d);
+  for (auto& u : r.relative_speed) v(u);
+}
+
+template <class Record, class Visitor>
+void visit_probe_response(Record& r, Visitor&& v) {
+  for (auto& q : r.q_rad) v(q);
+  v(r.position_m), v(r.orientation_rad), v(r.status), v(r.slot), v(r.sequence);
+}
+
+class Writer {
+ public:
+  Writer(std::uint8_t* out, ByteOrder order) : p_(out), order_(order) {}
+  template <class T>
+  void operator()(T value) {
+    for (std::size_t k = 0; k < sizeof(T); ++k) {
+      const std::size_t shift = 8 * (order_ == ByteOrder::little ? k : sizeof(T) - 1 - k);
+      p_[k] = static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> shift);
+    }
+    p_ += sizeof(T);
+  }
+  void bytes(const std::uint8_t* from, std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k) *p_++ = from[k];
+  }
+  void skip(std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k) *p_++ = 0;
+  }
+
+ private:
+  std::uint8_t* p_;
+  ByteOrder order_;
+};
+
+class Reader {
+ public:
+  Reader(const std::uint8_t* in, ByteOrder order) : p_(in), order_(order) {}
+  template <class T>
+  void operator()(T& value) {
+    std::uint64_t bits = 0;
+    for (std::size_t k = 0; k < sizeof(T); ++k) {
+      const std::size_t shift = 8 * (order_ == ByteOrder::little ? k : sizeof(T) - 1 - k);
+      bits |= static_cast<std::uint64_t>(p_[k]) << shift;
+    }
+    value = static_cast<T>(bits);
+    p_ += sizeof(T);
+  }
+  void bytes(std::uint8_t* to, std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k) to[k] = *p_++;
+  }
+  void skip(std::size_t size) { p_ += size; }
+
+ private:
+  const std::uint8_t* p_;
+  ByteOrder order_;
+};
+
+}  // namespace detail
+
+/// Writes a record into `out`, which holds at least the record's number of bytes.
+inline void encode(const Capability& r, ByteOrder order, std::uint8_t* out) {
+  detail::visit_capability(r, detail::Writer(out, order));
+}
+inline void encode(const Status& r, ByteOrder order, std::uint8_t* out) {
+  detail::visit_status(r, detail::Writer(out, order));
+}
+inline void encode(const ProbeRequest& r, ByteOrder order, std::uint8_t* out) {
+  detail::visit_probe_request(r, detail::Writer(out, order));
+}
+inline void encode(const ProbeResponse& r, ByteOrder order, std::uint8_t* out) {
+  detail::visit_probe_response(r, detail::Writer(out, order));
+}
+
+/// Reads a record from `in`, which holds at least the record's number of bytes.
+inline void decode(const std::uint8_t* in, ByteOrder order, Capability& r) {
+  detail::visit_capability(r, detail::Reader(in, order));
+}
+inline void decode(const std::uint8_t* in, ByteOrder order, Status& r) {
+  detail::visit_status(r, detail::Reader(in, order));
+}
+inline void decode(const std::uint8_t* in, ByteOrder order, ProbeRequest& r) {
+  detail::visit_probe_request(r, detail::Reader(in, order));
+}
+inline void decode(const std::uint8_t* in, ByteOrder order, ProbeResponse& r) {
+  detail::visit_probe_response(r, detail::Reader(in, order));
+}
+
+/// One sentence for people, without a full stop.
+inline const char* text(Answer a) {
+  switch (a) {
+    case Answer::accepted:
+      return "accepted";
+    case Answer::refused:
+      return "the image was refused";
+    case Answer::wrong_state:
+      return "not possible in the present state of the parameter store";
+    case Answer::busy:
+      return "the parameter store is busy";
+    case Answer::not_authorised:
+      return "not authorised at the controller";
+    case Answer::storage_failed:
+      return "the controller's non-volatile memory failed";
+    case Answer::incomplete:
+      return "fewer bytes arrived than were announced";
+    case Answer::no_previous:
+      return "there is no previous set to roll back to";
+    case Answer::unknown_command:
+      return "the command is not known to this controller";
+    case Answer::bad_argument:
+      return "the argument or the offset is out of range";
+    case Answer::reverted:
+      return "the set on trial was not confirmed in time and has reverted";
+  }
+  return "unknown answer";
+}
+
+inline const char* name(StoreState s) {
+  switch (s) {
+    case StoreState::idle:
+      return "idle";
+    case StoreState::receiving:
+      return "receiving";
+    case StoreState::verified:
+      return "verified";
+    case StoreState::working:
+      return "working";
+    case StoreState::trial:
+      return "trial";
+  }
+  return "unknown";
+}
+
+}  // namespace wire
+}  // namespace flexcomp
+
+#endif
