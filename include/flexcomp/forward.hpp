@@ -1,0 +1,422 @@
+/// \file
+/// The rigid-flexible forward model (Chen et al. 2019, Eq. 1 and 10-22, as read in terms on slots).
+///
+/// Torques, levers and moments are taken once, in the chain with the constant geometric and tool terms only;
+/// then all effects are added and the chain is evaluated again. This order is part of the contract: host,
+/// controller and outsiders agree on it to the last bit.
+#ifndef FLEXCOMP_FORWARD_HPP
+#define FLEXCOMP_FORWARD_HPP
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/linear.hpp"
+#include "flexcomp/model.hpp"
+#include "flexcomp/robot.hpp"
+#include "flexcomp/term.hpp"
+#include "flexcomp/trigonometry.hpp"
+
+namespace flexcomp {
+
+/// Link frames in F0: index 0 is F0, index i the frame after link i. Joint i (from 0) turns about z of frame
+/// i.
+template <class S, std::size_t N>
+struct Frames {
+  std::array<Matrix3<S>, N + 1> rotation;
+  std::array<Vector3<S>, N + 1> origin;
+
+  Vector3<S> axis(std::size_t frame, int column) const { return rotation[frame].col(column); }
+};
+
+/// What the load does, as one force and one moment about the origin of F0 (the effects' torques follow from
+/// it).
+template <class S>
+struct Load {
+  Vector3<S> force;   ///< N
+  Vector3<S> moment;  ///< N·m
+};
+
+/// Values of all slots that effects move, on top of the constant ones; m and rad.
+template <class S, std::size_t N>
+struct Slots {
+  std::array<std::array<S, 6>, N> link{};
+  std::array<S, 6> base{};
+  std::array<S, 6> tool{};
+  std::array<S, 3> point{};
+};
+
+/// Scratch of one evaluation. Nothing in it needs to be set by the caller.
+template <class S, std::size_t N = 6>
+struct Workspace {
+  std::array<S, N> q;                  ///< joint readings, rad
+  std::array<SinCos<S>, N> reading;    ///< of q
+  std::array<SinCos<S>, N> angle;      ///< of q + constant offset
+  std::array<SinCos<S>, N> deflected;  ///< of q + constant offset + effects
+  Frames<S, N> frames;                 ///< of the last pass, in F0
+  Load<S> load;
+  Slots<S, N> slots;
+  Vector3<S> point = Vector3<S>::Zero();  ///< where effects move the measured point, in Ftool, m
+};
+
+namespace detail {
+
+/// One link: frames[i] -> frames[i + 1]. The products are written out: Rot(z) mixes x and y, Rot(y) x and z,
+/// Rot(x) y and z, so a link costs 30 multiplications instead of 45.
+template <class S>
+inline void advance(const Matrix3<S>& from, const Vector3<S>& origin, const SinCos<S>& theta, const S& d,
+                    const S& a, const SinCos<S>& alpha, const SinCos<S>* beta, const SinCos<S>* gamma,
+                    Matrix3<S>& to, Vector3<S>& to_origin) {
+  Vector3<S> x = from.col(0) * theta.c + from.col(1) * theta.s;
+  const Vector3<S> y = from.col(1) * theta.c - from.col(0) * theta.s;
+  Vector3<S> z = from.col(2);
+  to_origin = origin + z * d + x * a;
+  if (gamma != nullptr) {
+    const Vector3<S> turned = x * gamma->c - z * gamma->s;
+    z = x * gamma->s + z * gamma->c;
+    x = turned;
+  }
+  to.col(1) = y * alpha.c + z * alpha.s;
+  z = z * alpha.c - y * alpha.s;
+  if (beta != nullptr) {
+    to.col(0) = x * beta->c - z * beta->s;
+    to.col(2) = x * beta->s + z * beta->c;
+  } else {
+    to.col(0) = x;
+    to.col(2) = z;
+  }
+}
+
+/// The chain with constant terms only, joint angles in ws.angle.
+template <class S, std::size_t N, class Cap>
+inline void unloaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
+  ws.frames.rotation[0].setIdentity();
+  ws.frames.origin[0].setZero();
+  for (std::size_t i = 0; i < N; ++i) {
+    const LinkShape<S>& link = model.shape(i);
+    advance<S>(ws.frames.rotation[i], ws.frames.origin[i], ws.angle[i], link.d, link.a, link.alpha,
+               link.has_beta ? &link.beta : nullptr, nullptr, ws.frames.rotation[i + 1],
+               ws.frames.origin[i + 1]);
+  }
+}
+
+/// The chain with all effects in ws.slots.
+template <class S, std::size_t N, class Cap>
+inline void loaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
+  ws.frames.rotation[0].setIdentity();
+  ws.frames.origin[0].setZero();
+  for (std::size_t i = 0; i < N; ++i) {
+    const LinkShape<S>& link = model.shape(i);
+    const unsigned moved = model.link_moves(i);
+    const std::array<S, 6>& delta = ws.slots.link[i];
+    ws.deflected[i] =
+        (moved & (1U << slot::theta)) != 0 ? rotate(ws.angle[i], delta[slot::theta]) : ws.angle[i];
+    if ((moved & ~(1U << slot::theta)) == 0) {
+      advance<S>(ws.frames.rotation[i], ws.frames.origin[i], ws.deflected[i], link.d, link.a, link.alpha,
+                 link.has_beta ? &link.beta : nullptr, nullptr, ws.frames.rotation[i + 1],
+                 ws.frames.origin[i + 1]);
+    } else {
+      const SinCos<S> alpha = rotate(link.alpha, delta[slot::alpha]);
+      const SinCos<S> beta = rotate(link.beta, delta[slot::beta]);
+      const SinCos<S> gamma = rotate(SinCos<S>{S(0), S(1)}, delta[slot::gamma]);
+      advance<S>(ws.frames.rotation[i], ws.frames.origin[i], ws.deflected[i], link.d + delta[slot::d],
+                 link.a + delta[slot::a], alpha, link.has_beta ? &beta : nullptr,
+                 (moved & (1U << slot::gamma)) != 0 ? &gamma : nullptr, ws.frames.rotation[i + 1],
+                 ws.frames.origin[i + 1]);
+    }
+  }
+}
+
+/// Payload weight and external force in the frames of ws (Eq. 10-13; the force Jacobian's detour equals
+/// this).
+template <class S, std::size_t N, class Cap>
+inline void take_load(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
+  const std::array<S, 4>& edit = model.load_edit();
+  const Vector3<S> com(context.payload_com_m[0] + edit[slot::com_x],
+                       context.payload_com_m[1] + edit[slot::com_y],
+                       context.payload_com_m[2] + edit[slot::com_z]);
+  const Vector3<S> weight = model.gravity() * (context.payload_kg + edit[slot::mass]);
+  const Matrix3<S>& flange = ws.frames.rotation[N];
+  const Vector3<S> at =
+      ws.frames.origin[N] + flange.col(0) * com.x() + flange.col(1) * com.y() + flange.col(2) * com.z();
+  const Vector3<S> force(context.force_n[0], context.force_n[1], context.force_n[2]);
+  const Vector3<S>& tool = model.tool_pose().position;
+  const Vector3<S> tool_at =
+      ws.frames.origin[N] + flange.col(0) * tool.x() + flange.col(1) * tool.y() + flange.col(2) * tool.z();
+  ws.load.force = weight + force;
+  ws.load.moment = cross<S>(at, weight) + cross<S>(tool_at, force);
+}
+
+/// Load moment about a direction through a point, N·m.
+template <class S>
+inline S moment_about(const Load<S>& load, const Vector3<S>& direction, const Vector3<S>& point) {
+  return dot<S>(direction, load.moment - cross<S>(point, load.force));
+}
+
+/// Lever of the link's own weight (effects.md): z · ((far - p) × g_hat) / ‖part of (far - p) perpendicular to
+/// z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is under 1 mm.
+template <class S, std::size_t N>
+inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity, std::size_t joint,
+                           std::size_t far) {
+  const Vector3<S> z = frames.axis(joint, 2);
+  const Vector3<S> arm = frames.origin[far] - frames.origin[joint];
+  const Vector3<S> across = arm - z * dot<S>(z, arm);
+  const S square = dot<S>(across, across);
+  const S g2 = dot<S>(gravity, gravity);
+  if (!(square > S(1e-6)) || !(g2 > S(0))) return S(0);
+  using std::sqrt;  // dual numbers bring their own
+  return dot<S>(z, cross<S>(arm, gravity)) / sqrt(square * g2);
+}
+
+/// Integer part towards zero; overloaded for dual numbers beside their type.
+inline std::int32_t truncate(double v) { return static_cast<std::int32_t>(v); }
+inline std::int32_t truncate(float v) { return static_cast<std::int32_t>(v); }
+template <class T>
+inline std::int32_t truncate(const T& v) {
+  return static_cast<std::int32_t>(v.a);
+}
+
+/// The four weights of a uniform periodic cubic B-spline and the index of the first coefficient.
+template <class S>
+struct CurveWeights {
+  std::array<S, 4> w;
+  std::array<std::uint16_t, 4> index;
+};
+
+/// δ(q) = Σ c_k B(M q / 2π - k), B the cardinal cubic B-spline centred at 0 (de Boor), period M.
+template <class S>
+inline CurveWeights<S> curve_weights(const S& q, std::uint16_t m) {
+  const S t = q * S(static_cast<float>(m)) * S(0.15915494309189533577);
+  std::int32_t k = 0;
+  // Readings lie within ±1e5 rad and M <= 256: far inside 32 bits. Written so that a NaN gives k = 0.
+  if (t > S(-1e7F) && t < S(1e7F)) k = truncate(t);
+  S u = t - S(static_cast<float>(k));
+  if (u < S(0)) {
+    u += S(1);
+    --k;
+  }
+  CurveWeights<S> r;
+  const S v = S(1) - u;
+  r.w[0] = v * v * v * S(1.0 / 6);
+  r.w[1] = S(2.0 / 3) - u * u * (S(1) - u * S(0.5));
+  r.w[2] = S(2.0 / 3) - v * v * (S(1) - v * S(0.5));
+  r.w[3] = u * u * u * S(1.0 / 6);
+  std::int32_t first = (k - 1) % static_cast<std::int32_t>(m);
+  if (first < 0) first += m;
+  for (std::size_t i = 0; i < 4; ++i) {
+    r.index[i] = static_cast<std::uint16_t>(first);
+    if (++first == m) first = 0;
+  }
+  return r;
+}
+
+template <class S, std::size_t N>
+inline S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
+                   const Context<S, N>& context) {
+  switch (kind) {
+    case Covariate::reading:
+      return q[joint];
+    case Covariate::payload:
+      return context.payload_kg;
+    case Covariate::temperature:
+      return context.temperature_c;
+    case Covariate::time:
+      return context.time_s;
+    case Covariate::direction:
+      return context.direction[joint];
+    case Covariate::relative_speed:
+      return context.relative_speed[joint];
+  }
+  return S(0);
+}
+
+/// The cell and the position in it (0 … 1) of x among ascending nodes; the ends hold outside.
+template <class S>
+struct Cell {
+  std::size_t index;
+  S fraction;
+};
+
+template <class S>
+inline Cell<S> find_cell(const S* nodes, std::size_t count, const S& x) {
+  if (!(x > nodes[0])) return {0, S(0)};
+  std::size_t k = 0;
+  while (k + 2 < count && x >= nodes[k + 1]) ++k;  // at most 64 nodes
+  if (x >= nodes[k + 1]) return {k, S(1)};
+  return {k, (x - nodes[k]) / (nodes[k + 1] - nodes[k])};
+}
+
+template <class S>
+inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cell<S>& column) {
+  const S* top = v + row.index * columns + column.index;
+  const S* bottom = top + columns;
+  const S upper = top[0] + (top[1] - top[0]) * column.fraction;
+  const S lower = bottom[0] + (bottom[1] - bottom[0]) * column.fraction;
+  return upper + (lower - upper) * row.fraction;
+}
+
+}  // namespace detail
+
+/// What a term is multiplied by at this pose: the basis φ(q, context). ws.frames and ws.load are those of the
+/// unloaded pass where needs_loads(basis, factor) holds.
+template <class S, std::size_t N, class Cap>
+inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
+                     const Workspace<S, N>& ws) {
+  const std::size_t j = term.joint;
+  switch (term.basis) {
+    case Basis::one:
+      return S(1);
+    case Basis::load_torque:
+      return detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
+    case Basis::load_torque_cubed: {
+      const S tau = detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
+      return tau * tau * tau;
+    }
+    case Basis::link_weight: {
+      std::size_t far = N - 1;
+      while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
+      return detail::link_weight_lever<S, N>(ws.frames, model.gravity(), j, far);
+    }
+    case Basis::reading:
+      return ws.q[j];
+    case Basis::sine:
+      return sin_cos(term.argument * ws.q[j]).s;
+    case Basis::cosine:
+      return sin_cos(term.argument * ws.q[j]).c;
+    case Basis::direction:
+      return -context.direction[j];
+    case Basis::relative_speed:
+      return context.relative_speed[j];
+    case Basis::thermal: {
+      const LinkShape<S>& link = model.nominal(term.place.body - 1U);
+      return (context.temperature_c - model.reference_temperature()) *
+             (term.place.slot == slot::a ? link.a : link.d);
+    }
+    case Basis::time:
+      return context.time_s;
+    case Basis::load_moment_x:
+      return detail::moment_about<S>(ws.load, ws.frames.axis(j + 1, 0), ws.frames.origin[j + 1]);
+    case Basis::load_moment_y:
+      return detail::moment_about<S>(ws.load, ws.frames.axis(j + 1, 1), ws.frames.origin[j + 1]);
+    case Basis::base_moment_x:
+      return detail::moment_about<S>(ws.load, Vector3<S>::UnitX(), Vector3<S>(S(0), S(0), term.argument));
+    case Basis::base_moment_y:
+      return detail::moment_about<S>(ws.load, Vector3<S>::UnitY(), Vector3<S>(S(0), S(0), term.argument));
+    case Basis::curve: {
+      const Table& table = model.table(term.table);
+      const S* c = model.values(table);
+      const detail::CurveWeights<S> b = detail::curve_weights(ws.q[j], table.size);
+      const S value =
+          c[b.index[0]] * b.w[0] + c[b.index[1]] * b.w[1] + c[b.index[2]] * b.w[2] + c[b.index[3]] * b.w[3];
+      switch (term.factor) {
+        case Factor::one:
+          return value;
+        case Factor::load_torque:
+          return value * detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
+        case Factor::temperature:
+          return value * (context.temperature_c - model.reference_temperature());
+        case Factor::payload:
+          return value * context.payload_kg;
+      }
+      return value;
+    }
+    case Basis::step:
+      return context.time_s >= term.argument ? S(1) : S(0);
+    case Basis::grid: {
+      const Table& table = model.table(term.table);
+      const S* nodes = model.values(table);
+      const S row = detail::covariate<S, N>(table.row_covariate, table.row_joint, ws.q, context);
+      const S column = detail::covariate<S, N>(table.column_covariate, table.column_joint, ws.q, context);
+      return detail::bilinear<S>(nodes + table.rows + table.columns, table.columns,
+                                 detail::find_cell<S>(nodes, table.rows, row),
+                                 detail::find_cell<S>(nodes + table.rows, table.columns, column));
+    }
+  }
+  return S(0);
+}
+
+namespace detail {
+
+/// Both passes for the readings in ws.q, ws.reading; leaves the loaded frames in ws.
+template <class S, std::size_t N, class Cap>
+inline Pose<S> evaluate(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
+  for (std::size_t i = 0; i < N; ++i) ws.angle[i] = compose(ws.reading[i], model.shape(i).offset);
+  if (model.needs_loads()) {
+    unloaded_pass(model, ws);
+    take_load(model, context, ws);
+  }
+  ws.slots = Slots<S, N>();
+  for (std::size_t k = 0; k < model.effect_count(); ++k) {
+    const Term<S>& term = model.effect(k);
+    const S value = term.coefficient * basis_value(model, term, context, ws);
+    const Place p = term.place;
+    if (p.body == body::base) {
+      ws.slots.base[p.slot] += value;
+    } else if (p.body == body::tool) {
+      ws.slots.tool[p.slot] += value;
+    } else if (p.body == body::point) {
+      ws.slots.point[p.slot] += value;
+    } else {
+      ws.slots.link[p.body - 1U][p.slot] += value;
+    }
+  }
+  loaded_pass(model, ws);
+  ws.point = Vector3<S>(ws.slots.point[0], ws.slots.point[1], ws.slots.point[2]);
+  Pose<S> pose{ws.frames.rotation[N], ws.frames.origin[N]};
+  if (model.tool_moves()) {
+    std::array<S, 6> tool = model.tool();
+    for (std::size_t k = 0; k < 6; ++k) tool[k] += ws.slots.tool[k];
+    pose = pose * (model.nominal_tool() * small_pose(tool));
+  } else {
+    pose = pose * model.tool_pose();
+  }
+  if (model.base_moves()) {
+    std::array<S, 6> base = model.base();
+    for (std::size_t k = 0; k < 6; ++k) base[k] += ws.slots.base[k];
+    pose = small_pose(base) * pose;
+  } else if (model.has_base()) {
+    pose = model.base_pose() * pose;
+  }
+  return pose;
+}
+
+/// The nominal chain for given sines and cosines of the readings.
+template <class S, std::size_t N, class Cap>
+inline void nominal_pass(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& reading,
+                         Frames<S, N>& frames) {
+  frames.rotation[0].setIdentity();
+  frames.origin[0].setZero();
+  for (std::size_t i = 0; i < N; ++i) {
+    const LinkShape<S>& link = model.nominal(i);
+    advance<S>(frames.rotation[i], frames.origin[i], compose(reading[i], link.offset), link.d, link.a,
+               link.alpha, link.has_beta ? &link.beta : nullptr, nullptr, frames.rotation[i + 1],
+               frames.origin[i + 1]);
+  }
+}
+
+}  // namespace detail
+
+/// Pose of Ftool in Fb with all terms, for joint readings q (rad). Includes B, but not the frames of a
+/// measurement (F, E); ws.point is where effects move the measured point in Ftool.
+template <class S, std::size_t N, class Cap>
+inline Pose<S> forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad,
+                       const Context<S, N>& context, Workspace<S, N>& ws) {
+  ws.q = q_rad;
+  for (std::size_t i = 0; i < N; ++i) ws.reading[i] = sin_cos(q_rad[i]);
+  return detail::evaluate(model, context, ws);
+}
+
+/// Pose of Ftool in F0 after the maker's drawing, for joint readings q (rad).
+template <class S, std::size_t N, class Cap>
+inline Pose<S> nominal_forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad) {
+  std::array<SinCos<S>, N> reading;
+  for (std::size_t i = 0; i < N; ++i) reading[i] = sin_cos(q_rad[i]);
+  Frames<S, N> frames;
+  detail::nominal_pass(model, reading, frames);
+  return Pose<S>{frames.rotation[N], frames.origin[N]} * model.nominal_tool();
+}
+
+}  // namespace flexcomp
+
+#endif

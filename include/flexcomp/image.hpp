@@ -1,0 +1,255 @@
+/// \file
+/// The parameter image: terms as bytes, bound to one robot. The same bytes travel over every bus and lie in
+/// every slot. All numbers are little-endian, reals are binary64 in SI units.
+///
+///     header, 96 bytes                                  records, from byte header_bytes
+///      0  "FLXC"                                         u16 type (bit 15: may be skipped if unknown)
+///      4  u8  schema major, u8 schema minor              u16 length of what follows, a multiple of 4
+///      6  u16 header_bytes (96)                          type 1, term, 28 bytes:
+///      8  u32 total_bytes, header … CRC                     u8 body, slot, basis, joint, factor, effect
+///     12  u32 sequence                                      u16 instance, u16 table, u16 0
+///     16  nominal hash, 32 bytes                            f64 argument, f64 coefficient
+///     48  SHA-256 of the robot's name, 32 bytes          type 2, table, 8 + 8 n bytes (curve: rows 0):
+///     80  u16 terms, u16 tables                             u16 rows, u16 columns
+///     84  u32 table values                                  u8 row covariate, row joint, column covariate,
+///     column joint 88  u32 flags (0), u32 0                              f64 values (term.hpp, Table)
+///                                                        tables come before terms
+///     last 4 bytes: CRC-32 (IEEE 802.3) of all before
+#ifndef FLEXCOMP_IMAGE_HPP
+#define FLEXCOMP_IMAGE_HPP
+
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/bytes.hpp"
+#include "flexcomp/crc32.hpp"
+#include "flexcomp/model.hpp"
+#include "flexcomp/robot.hpp"
+#include "flexcomp/status.hpp"
+#include "flexcomp/term.hpp"
+
+namespace flexcomp {
+
+namespace image {
+constexpr std::uint8_t schema_major = 1;
+constexpr std::uint8_t schema_minor = 0;
+constexpr std::size_t header_bytes = 96;
+constexpr std::size_t crc_bytes = 4;
+constexpr std::size_t record_head_bytes = 4;
+constexpr std::size_t term_bytes = 28;
+constexpr std::size_t table_head_bytes = 8;
+constexpr std::uint16_t record_term = 1;
+constexpr std::uint16_t record_table = 2;
+constexpr std::uint16_t optional_record = 0x8000;
+}  // namespace image
+
+struct ImageHeader {
+  std::uint8_t schema_major = image::schema_major;
+  std::uint8_t schema_minor = image::schema_minor;
+  std::uint32_t total_bytes = 0;
+  std::uint32_t sequence = 0;
+  Sha256Digest nominal_hash{};
+  Sha256Digest name_hash{};
+  std::uint16_t terms = 0;
+  std::uint16_t tables = 0;
+  std::uint32_t values = 0;
+};
+
+/// Bytes that the image of this list takes.
+template <class S>
+inline std::size_t image_size(const TermList<S>& list) {
+  std::size_t size = image::header_bytes + image::crc_bytes;
+  for (std::size_t k = 0; k < list.table_count; ++k) {
+    size += image::record_head_bytes + image::table_head_bytes +
+            8 * static_cast<std::size_t>(list.tables[k].size);
+  }
+  return size + list.count * (image::record_head_bytes + image::term_bytes);
+}
+
+/// Writes the image of a list into out; returns its size, or 0 where it does not fit (or a count overflows).
+/// Of the header only sequence, nominal_hash and name_hash are read.
+template <class S>
+inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& header, std::uint8_t* out,
+                                std::size_t capacity) {
+  const std::size_t size = image_size(list);
+  if (size > capacity || list.count > 0xFFFF || list.table_count > 0xFFFF) return 0;
+  for (std::size_t k = 0; k < image::header_bytes; ++k) out[k] = 0;
+  out[0] = 'F';
+  out[1] = 'L';
+  out[2] = 'X';
+  out[3] = 'C';
+  out[4] = image::schema_major;
+  out[5] = image::schema_minor;
+  store_u16(out + 6, static_cast<std::uint16_t>(image::header_bytes));
+  store_u32(out + 8, static_cast<std::uint32_t>(size));
+  store_u32(out + 12, header.sequence);
+  for (std::size_t k = 0; k < 32; ++k) {
+    out[16 + k] = header.nominal_hash[k];
+    out[48 + k] = header.name_hash[k];
+  }
+  store_u16(out + 80, static_cast<std::uint16_t>(list.count));
+  store_u16(out + 82, static_cast<std::uint16_t>(list.table_count));
+  std::uint8_t* p = out + image::header_bytes;
+  std::uint32_t values = 0;
+  for (std::size_t k = 0; k < list.table_count; ++k) {
+    const Table& t = list.tables[k];
+    store_u16(p, image::record_table);
+    store_u16(p + 2, static_cast<std::uint16_t>(image::table_head_bytes + 8U * t.size));
+    store_u16(p + 4, t.rows);
+    store_u16(p + 6, t.columns);
+    p[8] = static_cast<std::uint8_t>(t.row_covariate);
+    p[9] = t.row_joint;
+    p[10] = static_cast<std::uint8_t>(t.column_covariate);
+    p[11] = t.column_joint;
+    p += image::record_head_bytes + image::table_head_bytes;
+    for (std::size_t i = 0; i < t.size; ++i, p += 8)
+      store_u64(p, to_binary64_bits(list.values[t.offset + i]));
+    values += t.size;
+  }
+  store_u32(out + 84, values);
+  for (std::size_t k = 0; k < list.count; ++k) {
+    const Term<S>& t = list.terms[k];
+    store_u16(p, image::record_term);
+    store_u16(p + 2, static_cast<std::uint16_t>(image::term_bytes));
+    p[4] = t.place.body;
+    p[5] = t.place.slot;
+    p[6] = static_cast<std::uint8_t>(t.basis);
+    p[7] = t.joint;
+    p[8] = static_cast<std::uint8_t>(t.factor);
+    p[9] = static_cast<std::uint8_t>(t.effect);
+    store_u16(p + 10, t.instance);
+    store_u16(p + 12, t.table);
+    store_u16(p + 14, 0);
+    store_u64(p + 16, to_binary64_bits(t.argument));
+    store_u64(p + 24, to_binary64_bits(t.coefficient));
+    p += image::record_head_bytes + image::term_bytes;
+  }
+  store_u32(p, crc32(out, size - image::crc_bytes));
+  return size;
+}
+
+/// Reads and checks the header alone: magic, schema, lengths against `size`. Never reads beyond `size`.
+inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHeader& header) {
+  if (size < image::header_bytes + image::crc_bytes) return Refusal::truncated;
+  if (bytes[0] != 'F' || bytes[1] != 'L' || bytes[2] != 'X' || bytes[3] != 'C') return Refusal::bad_magic;
+  header.schema_major = bytes[4];
+  header.schema_minor = bytes[5];
+  if (header.schema_major != image::schema_major) return Refusal::schema;
+  if (load_u16(bytes + 6) != image::header_bytes) return Refusal::bad_length;
+  header.total_bytes = load_u32(bytes + 8);
+  header.sequence = load_u32(bytes + 12);
+  for (std::size_t k = 0; k < 32; ++k) {
+    header.nominal_hash[k] = bytes[16 + k];
+    header.name_hash[k] = bytes[48 + k];
+  }
+  header.terms = load_u16(bytes + 80);
+  header.tables = load_u16(bytes + 82);
+  header.values = load_u32(bytes + 84);
+  if (header.total_bytes > size) return Refusal::truncated;
+  if (header.total_bytes != size) return Refusal::bad_length;
+  return Refusal::none;
+}
+
+/// Header, checksum and binding: everything that can be said without reading the records.
+inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sha256Digest& nominal,
+                           const Sha256Digest& name, ImageHeader& header) {
+  const Refusal r = read_header(bytes, size, header);
+  if (r != Refusal::none) return r;
+  if (crc32(bytes, size - image::crc_bytes) != load_u32(bytes + size - image::crc_bytes))
+    return Refusal::checksum;
+  if (header.name_hash != name) return Refusal::wrong_robot;
+  if (header.nominal_hash != nominal) return Refusal::wrong_nominal;
+  return Refusal::none;
+}
+
+/// Hands each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t*
+/// values)` and `Refusal term(const Term<S>&)`. Stops at the first refusal. Bounded by the size of the image.
+template <class S, class Visitor>
+inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&& visitor) {
+  ImageHeader header;
+  const Refusal head = read_header(bytes, size, header);
+  if (head != Refusal::none) return head;
+  const std::uint8_t* p = bytes + image::header_bytes;
+  std::size_t left = size - image::header_bytes - image::crc_bytes;
+  std::size_t terms = 0;
+  std::size_t tables = 0;
+  std::size_t offset = 0;
+  while (left != 0) {
+    if (left < image::record_head_bytes) return Refusal::bad_length;
+    const std::uint16_t type = load_u16(p);
+    const std::size_t length = load_u16(p + 2);
+    if (length % 4 != 0 || length > left - image::record_head_bytes) return Refusal::bad_length;
+    const std::uint8_t* body = p + image::record_head_bytes;
+    Refusal r = Refusal::none;
+    if (type == image::record_term) {
+      if (length != image::term_bytes) return Refusal::bad_length;
+      Term<S> t;
+      t.place = {body[0], body[1]};
+      t.basis = static_cast<Basis>(body[2]);
+      t.joint = body[3];
+      t.factor = static_cast<Factor>(body[4]);
+      t.effect = static_cast<Effect>(body[5]);
+      t.instance = load_u16(body + 6);
+      t.table = load_u16(body + 8);
+      t.argument = load_scalar<S>(body + 12);
+      t.coefficient = load_scalar<S>(body + 20);
+      if (!is_finite(t.argument) || !is_finite(t.coefficient)) return Refusal::bad_value;
+      ++terms;
+      r = visitor.term(t);
+    } else if (type == image::record_table) {
+      if (length < image::table_head_bytes || (length - image::table_head_bytes) % 8 != 0)
+        return Refusal::bad_length;
+      Table t;
+      t.size = static_cast<std::uint16_t>((length - image::table_head_bytes) / 8);
+      t.offset = static_cast<std::uint16_t>(offset);
+      t.rows = load_u16(body);
+      t.columns = load_u16(body + 2);
+      t.row_covariate = static_cast<Covariate>(body[4]);
+      t.row_joint = body[5];
+      t.column_covariate = static_cast<Covariate>(body[6]);
+      t.column_joint = body[7];
+      for (std::size_t k = 0; k < t.size; ++k) {
+        if (!is_finite(load_scalar<S>(body + image::table_head_bytes + 8 * k))) return Refusal::bad_value;
+      }
+      offset += t.size;
+      ++tables;
+      r = visitor.table(t, body + image::table_head_bytes);
+    } else if ((type & image::optional_record) == 0) {
+      return Refusal::unknown_record;
+    }
+    if (r != Refusal::none) return r;
+    p += image::record_head_bytes + length;
+    left -= image::record_head_bytes + length;
+  }
+  if (terms != header.terms || tables != header.tables || offset != header.values) return Refusal::bad_length;
+  return Refusal::none;
+}
+
+/// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used.
+/// Effects that belong to the measurement (place `point`, base drift, readout lag) are refused: they are
+/// never pushed.
+template <class S, std::size_t N, class Cap>
+inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, const NominalRobot<N>& robot,
+                                Model<S, N, Cap>& model) {
+  struct Builder {
+    Model<S, N, Cap>& model;
+    Refusal table(const Table& t, const std::uint8_t* values) {
+      return model.add_table_from([values](std::size_t k) { return load_scalar<S>(values + 8 * k); }, t);
+    }
+    Refusal term(const Term<S>& t) {
+      if (t.place.body == body::point || t.effect == Effect::base_drift || t.effect == Effect::readout_lag ||
+          t.effect == Effect::reflector_slip) {
+        return Refusal::bad_place;
+      }
+      return model.add(t);
+    }
+  };
+  model.begin(robot);
+  const Refusal r = visit_image<S>(bytes, size, Builder{model});
+  if (r == Refusal::none) model.finish();
+  return r;
+}
+
+}  // namespace flexcomp
+
+#endif

@@ -1,0 +1,51 @@
+/// \file
+/// Fixed-size vectors, rotations and poses. Nothing here allocates: only 3-vectors, 3x3 matrices and
+/// 6-vectors.
+#ifndef FLEXCOMP_LINEAR_HPP
+#define FLEXCOMP_LINEAR_HPP
+
+#include <Eigen/Core>
+
+namespace flexcomp {
+
+template <class S>
+using Vector3 = Eigen::Matrix<S, 3, 1>;
+template <class S>
+using Vector6 = Eigen::Matrix<S, 6, 1>;
+template <class S>
+using Matrix3 = Eigen::Matrix<S, 3, 3>;
+
+/// Rigid transform: maps coordinates of the inner frame to the outer one, x_outer = rotation * x_inner +
+/// position.
+template <class S>
+struct Pose {
+  Matrix3<S> rotation = Matrix3<S>::Identity();
+  Vector3<S> position = Vector3<S>::Zero();  ///< m
+};
+
+template <class S>
+inline Vector3<S> cross(const Vector3<S>& a, const Vector3<S>& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(), a.x() * b.y() - a.y() * b.x()};
+}
+
+template <class S>
+inline S dot(const Vector3<S>& a, const Vector3<S>& b) {
+  return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
+}
+
+template <class S>
+inline Pose<S> operator*(const Pose<S>& outer, const Pose<S>& inner) {
+  Pose<S> r;
+  for (int j = 0; j < 3; ++j) {
+    r.rotation.col(j) = outer.rotation.col(0) * inner.rotation(0, j) +
+                        outer.rotation.col(1) * inner.rotation(1, j) +
+                        outer.rotation.col(2) * inner.rotation(2, j);
+  }
+  r.position = outer.position + outer.rotation.col(0) * inner.position.x() +
+               outer.rotation.col(1) * inner.position.y() + outer.rotation.col(2) * inner.position.z();
+  return r;
+}
+
+}  // namespace flexcomp
+
+#endif

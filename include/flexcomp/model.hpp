@@ -1,0 +1,288 @@
+/// \file
+/// The prepared model: nominal chain + terms, with every constant term folded in once. Build it with begin(),
+/// add_table(), add(), finish(); afterwards it is only read. Evaluation is in forward.hpp.
+#ifndef FLEXCOMP_MODEL_HPP
+#define FLEXCOMP_MODEL_HPP
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/linear.hpp"
+#include "flexcomp/robot.hpp"
+#include "flexcomp/status.hpp"
+#include "flexcomp/term.hpp"
+#include "flexcomp/trigonometry.hpp"
+
+namespace flexcomp {
+
+/// How much a model holds: terms that are not constant (constant ones cost nothing), tables, and their
+/// values.
+template <std::size_t Terms, std::size_t Tables, std::size_t Values>
+struct Capacity {
+  static constexpr std::size_t terms = Terms;
+  static constexpr std::size_t tables = Tables;
+  static constexpr std::size_t values = Values;
+};
+
+/// Room for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more
+/// effects.
+using DefaultCapacity = Capacity<64, 8, 768>;
+
+/// Constant part of a link: Rot(z, q + offset) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta).
+template <class S>
+struct LinkShape {
+  SinCos<S> offset{S(0), S(1)};
+  SinCos<S> alpha{S(0), S(1)};
+  SinCos<S> beta{S(0), S(1)};
+  S d = S(0);  ///< m
+  S a = S(0);  ///< m
+  bool has_beta = false;
+};
+
+/// Rigid transform of six small values: Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and rad.
+template <class S>
+inline Pose<S> small_pose(const std::array<S, 6>& v) {
+  const SinCos<S> x = sin_cos(v[slot::rx]);
+  const SinCos<S> y = sin_cos(v[slot::ry]);
+  const SinCos<S> z = sin_cos(v[slot::rz]);
+  Pose<S> pose;
+  pose.rotation << z.c * y.c, z.c * y.s * x.s - z.s * x.c, z.c * y.s * x.c + z.s * x.s,  //
+      z.s * y.c, z.s * y.s * x.s + z.c * x.c, z.s * y.s * x.c - z.c * x.s,               //
+      -y.s, y.c * x.s, y.c * x.c;
+  pose.position = Vector3<S>(v[0], v[1], v[2]);
+  return pose;
+}
+
+/// Nominal chain + terms of an arm with N revolute joints, prepared for the scalar S.
+template <class S, std::size_t N = 6, class Cap = DefaultCapacity>
+class Model {
+ public:
+  using Scalar = S;
+  static constexpr std::size_t joints = N;
+
+  /// Starts anew with the nominal robot and no terms.
+  void begin(const NominalRobot<N>& robot) {
+    // Member by member: a temporary of this size has no place on a controller's stack.
+    robot_ = robot;
+    constant_ = {};
+    base_ = {};
+    tool_ = {};
+    load_edit_ = {};
+    link_moves_ = {};
+    has_base_ = base_moves_ = tool_moves_ = needs_loads_ = false;
+    effect_count_ = table_count_ = value_count_ = 0;
+    for (std::size_t i = 0; i < N; ++i) {
+      const NominalLink& link = robot.links[i];
+      nominal_[i].offset = sin_cos(from_binary64<S>(link.theta_rad));
+      nominal_[i].alpha = sin_cos(from_binary64<S>(link.alpha_rad));
+      nominal_[i].beta = sin_cos(from_binary64<S>(link.beta_rad));
+      nominal_[i].d = from_binary64<S>(link.d_m);
+      nominal_[i].a = from_binary64<S>(link.a_m);
+      nominal_[i].has_beta = bits_of(link.beta_rad) << 1U != 0;
+    }
+    const S w = from_binary64<S>(robot.tool_wxyz[0]);
+    const S x = from_binary64<S>(robot.tool_wxyz[1]);
+    const S y = from_binary64<S>(robot.tool_wxyz[2]);
+    const S z = from_binary64<S>(robot.tool_wxyz[3]);
+    nominal_tool_.rotation << S(1) - S(2) * (y * y + z * z), S(2) * (x * y - w * z), S(2) * (x * z + w * y),
+        S(2) * (x * y + w * z), S(1) - S(2) * (x * x + z * z), S(2) * (y * z - w * x), S(2) * (x * z - w * y),
+        S(2) * (y * z + w * x), S(1) - S(2) * (x * x + y * y);
+    for (std::size_t k = 0; k < 3; ++k) {
+      nominal_tool_.position[static_cast<int>(k)] = from_binary64<S>(robot.tool_xyz_m[k]);
+      gravity_[static_cast<int>(k)] = from_binary64<S>(robot.gravity_m_s2[k]);
+    }
+    for (std::size_t i = 0; i < N; ++i) {
+      lower_[i] = from_binary64<S>(robot.limits[i].min_rad);
+      upper_[i] = from_binary64<S>(robot.limits[i].max_rad);
+    }
+    reference_temperature_ = from_binary64<S>(robot.reference_temperature_c);
+    const double g0 = robot.gravity_m_s2[0];
+    const double g1 = robot.gravity_m_s2[1];
+    axial_gravity_ = is_zero(g0) && is_zero(g1);
+  }
+
+  /// Appends a table; value(k) gives its k-th value, which is copied. Indices count in the order of the
+  /// calls.
+  template <class Value>
+  Refusal add_table_from(const Value& value, const Table& table) {
+    if (table_count_ >= Cap::tables || value_count_ + table.size > Cap::values)
+      return Refusal::table_too_large;
+    if (table.rows == 0 ? (table.size < 6 || table.size > 256)
+                        : (table.rows < 2 || table.columns < 2 || table.rows > 64 || table.columns > 64 ||
+                           table.size != table.rows + table.columns + table.rows * table.columns)) {
+      return Refusal::bad_value;
+    }
+    if (table.row_joint >= N || table.column_joint >= N ||
+        static_cast<std::uint8_t>(table.row_covariate) >
+            static_cast<std::uint8_t>(Covariate::relative_speed) ||
+        static_cast<std::uint8_t>(table.column_covariate) >
+            static_cast<std::uint8_t>(Covariate::relative_speed)) {
+      return Refusal::bad_value;
+    }
+    for (unsigned side = 0, from = 0; table.rows != 0 && side < 2; ++side) {
+      const unsigned nodes = side == 0 ? table.rows : table.columns;
+      for (unsigned k = 1; k < nodes; ++k) {
+        if (!(value(from + k) > value(from + k - 1))) return Refusal::bad_value;
+      }
+      from += nodes;
+    }
+    tables_[table_count_] = table;
+    tables_[table_count_].offset = static_cast<std::uint16_t>(value_count_);
+    for (std::size_t k = 0; k < table.size; ++k) values_[value_count_ + k] = value(k);
+    value_count_ += table.size;
+    ++table_count_;
+    return Refusal::none;
+  }
+
+  Refusal add_table(const Table& table, const S* values) {
+    return add_table_from([values](std::size_t k) { return values[k]; }, table);
+  }
+
+  /// Appends a term. Tables come before the terms that read them.
+  Refusal add(const Term<S>& term) {
+    const Place p = term.place;
+    const bool link = p.body >= 1 && p.body <= N;
+    if (!(link && p.slot <= slot::gamma) && !(p.body == body::base && p.slot <= slot::rz) &&
+        !(p.body == body::tool && p.slot <= slot::rz) && !(p.body == body::load && p.slot <= slot::com_z) &&
+        !(p.body == body::point && p.slot <= slot::z)) {
+      return Refusal::bad_place;
+    }
+    if (static_cast<std::uint8_t>(term.basis) >= basis_count) return Refusal::unknown_basis;
+    if (static_cast<std::uint8_t>(term.factor) > static_cast<std::uint8_t>(Factor::payload))
+      return Refusal::bad_value;
+    if (term.joint >= N) return Refusal::bad_value;
+    // The load is edited before torques are taken, so its edit cannot depend on the pose.
+    if (p.body == body::load && term.basis != Basis::one) return Refusal::bad_place;
+    if (term.basis == Basis::thermal && !(link && (p.slot == slot::a || p.slot == slot::d)))
+      return Refusal::bad_place;
+    if (term.basis == Basis::link_weight) {
+      if (!axial_gravity_) return Refusal::mounting;
+      if (!(term.argument > S(term.joint) && term.argument < S(N))) return Refusal::bad_value;
+    }
+    if (term.basis == Basis::curve || term.basis == Basis::grid) {
+      if (term.table >= table_count_) return Refusal::bad_value;
+      if ((tables_[term.table].rows != 0) != (term.basis == Basis::grid)) return Refusal::bad_value;
+    }
+    if (is_constant(term)) {
+      if (p.body == body::load) {
+        load_edit_[p.slot] += term.coefficient;
+      } else if (p.body == body::base) {
+        base_[p.slot] += term.coefficient;
+        has_base_ = true;
+      } else if (p.body == body::tool) {
+        tool_[p.slot] += term.coefficient;
+      } else {
+        constant_[p.body - 1U][p.slot] += term.coefficient;
+      }
+      return Refusal::none;
+    }
+    if (effect_count_ >= Cap::terms) return Refusal::too_many_terms;
+    effects_[effect_count_++] = term;
+    if (flexcomp::needs_loads(term.basis, term.factor)) needs_loads_ = true;
+    if (p.body == body::base) {
+      has_base_ = true;
+      base_moves_ = true;
+    } else if (p.body == body::tool) {
+      tool_moves_ = true;
+    } else if (link) {
+      link_moves_[p.body - 1U] = static_cast<std::uint8_t>(link_moves_[p.body - 1U] | (1U << p.slot));
+    }
+    return Refusal::none;
+  }
+
+  /// Folds the constant terms. Call once after the last add().
+  void finish() {
+    for (std::size_t i = 0; i < N; ++i) {
+      shape_[i] = nominal_[i];
+      shape_[i].offset = rotate(nominal_[i].offset, constant_[i][slot::theta]);
+      shape_[i].d += constant_[i][slot::d];
+      shape_[i].a += constant_[i][slot::a];
+      shape_[i].alpha = rotate(nominal_[i].alpha, constant_[i][slot::alpha]);
+      shape_[i].beta = rotate(nominal_[i].beta, constant_[i][slot::beta]);
+      shape_[i].has_beta = nominal_[i].has_beta || !is_zero(constant_[i][slot::beta]) ||
+                           (link_moves_[i] & (1U << slot::beta)) != 0;
+    }
+    base_pose_ = small_pose(base_);
+    tool_pose_ = nominal_tool_ * small_pose(tool_);
+  }
+
+  /// All of a term list at once.
+  Refusal prepare(const NominalRobot<N>& robot, const TermList<S>& list) {
+    begin(robot);
+    for (std::size_t k = 0; k < list.table_count; ++k) {
+      const Refusal r = add_table(list.tables[k], list.values + list.tables[k].offset);
+      if (r != Refusal::none) return r;
+    }
+    for (std::size_t k = 0; k < list.count; ++k) {
+      const Refusal r = add(list.terms[k]);
+      if (r != Refusal::none) return r;
+    }
+    finish();
+    return Refusal::none;
+  }
+
+  const NominalRobot<N>& robot() const { return robot_; }
+  const LinkShape<S>& nominal(std::size_t i) const { return nominal_[i]; }
+  const LinkShape<S>& shape(std::size_t i) const { return shape_[i]; }
+  const Pose<S>& nominal_tool() const { return nominal_tool_; }
+  const Pose<S>& tool_pose() const { return tool_pose_; }
+  const Pose<S>& base_pose() const { return base_pose_; }
+  const std::array<S, 6>& base() const { return base_; }  ///< constant part, m and rad
+  const std::array<S, 6>& tool() const { return tool_; }  ///< constant part, m and rad
+  S lower(std::size_t i) const { return lower_[i]; }      ///< joint limit, rad
+  S upper(std::size_t i) const { return upper_[i]; }      ///< joint limit, rad
+  const Vector3<S>& gravity() const { return gravity_; }  ///< m/s^2, in F0
+  S reference_temperature() const { return reference_temperature_; }
+  const std::array<S, 4>& load_edit() const { return load_edit_; }  ///< kg, m
+  bool has_base() const { return has_base_; }
+  bool base_moves() const { return base_moves_; }
+  bool tool_moves() const { return tool_moves_; }
+  bool needs_loads() const { return needs_loads_; }
+  /// Bits 1 << slot of link i that some effect moves.
+  std::uint8_t link_moves(std::size_t i) const { return link_moves_[i]; }
+  std::size_t effect_count() const { return effect_count_; }
+  const Term<S>& effect(std::size_t k) const { return effects_[k]; }
+  const Table& table(std::size_t k) const { return tables_[k]; }
+  std::size_t table_count() const { return table_count_; }
+  const S* values(const Table& table) const { return values_.data() + table.offset; }
+
+ private:
+  static bool is_zero(double v) { return bits_of(v) << 1U == 0; }
+  static bool is_zero(float v) { return to_binary64_bits(v) << 1U == 0; }
+  template <class T>
+  static bool is_zero(const T&) {
+    return false;  // a dual number's derivative counts although its value is zero
+  }
+
+  NominalRobot<N> robot_{};
+  std::array<LinkShape<S>, N> nominal_{};
+  std::array<LinkShape<S>, N> shape_{};
+  std::array<std::array<S, 6>, N> constant_{};
+  std::array<S, N> lower_{};
+  std::array<S, N> upper_{};
+  std::array<S, 6> base_{};
+  std::array<S, 6> tool_{};
+  std::array<S, 4> load_edit_{};
+  Pose<S> nominal_tool_{};
+  Pose<S> tool_pose_{};
+  Pose<S> base_pose_{};
+  Vector3<S> gravity_ = Vector3<S>::Zero();
+  S reference_temperature_ = S(20);
+  bool has_base_ = false;
+  bool base_moves_ = false;
+  bool tool_moves_ = false;
+  bool needs_loads_ = false;
+  bool axial_gravity_ = true;
+  std::array<std::uint8_t, N> link_moves_{};
+  std::size_t effect_count_ = 0;
+  std::size_t table_count_ = 0;
+  std::size_t value_count_ = 0;
+  std::array<Term<S>, Cap::terms> effects_{};
+  std::array<Table, Cap::tables> tables_{};
+  std::array<S, Cap::values> values_{};
+};
+
+}  // namespace flexcomp
+
+#endif

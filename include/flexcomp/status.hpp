@@ -1,0 +1,106 @@
+/// \file
+/// Outcomes of the core. Every function that can refuse returns one; nothing throws.
+#ifndef FLEXCOMP_STATUS_HPP
+#define FLEXCOMP_STATUS_HPP
+
+#include <cstdint>
+
+namespace flexcomp {
+
+/// Why a parameter set, an image or a model was refused. The numbers are on the wire: add, never change.
+enum class Refusal : std::uint8_t {
+  none = 0,
+  truncated = 1,         ///< fewer bytes than a header, or than the header announces
+  bad_magic = 2,         ///< not a flexcomp image
+  schema = 3,            ///< a schema major version that this build does not know
+  bad_length = 4,        ///< lengths in header and records do not add up
+  checksum = 5,          ///< CRC-32 differs
+  wrong_robot = 6,       ///< made for a robot of another name
+  wrong_nominal = 7,     ///< made for another nominal geometry
+  unknown_record = 8,    ///< a record type that this build does not know
+  unknown_basis = 9,     ///< a basis id that this build does not evaluate
+  bad_place = 10,        ///< a place that the chain does not have, or that is never pushed
+  bad_value = 11,        ///< a non-finite number, a joint or table index out of range
+  too_many_terms = 12,   ///< more terms than the controller holds
+  table_too_large = 13,  ///< more table values than the controller holds
+  implausible = 14,      ///< moves the tool farther than the plausibility limit
+  mounting = 15,         ///< link_gravity where gravity is not along the axis of joint 1
+  too_long = 16,         ///< longer than the staging memory
+  stale_sequence = 17,   ///< a sequence number not above the active one
+};
+
+/// What became of one joint command. The numbers are on the wire: add, never change.
+enum class StepStatus : std::uint8_t {
+  ok = 0,
+  near_singular = 1,  ///< corrected, but damped near a singularity: orientation is given up before position
+  limited = 2,        ///< the correction was scaled down to the largest allowed one
+  at_limit = 3,       ///< a corrected joint is held at its limit
+  no_set = 4,         ///< no valid parameter set: the command was passed through
+  refused = 5,        ///< the command was not finite or beyond a joint limit: passed through
+};
+
+/// Lower-case name of a status as in files (`ok near_singular limited at_limit no_set refused`).
+inline const char* name(StepStatus s) {
+  switch (s) {
+    case StepStatus::ok:
+      return "ok";
+    case StepStatus::near_singular:
+      return "near_singular";
+    case StepStatus::limited:
+      return "limited";
+    case StepStatus::at_limit:
+      return "at_limit";
+    case StepStatus::no_set:
+      return "no_set";
+    case StepStatus::refused:
+      return "refused";
+  }
+  return "unknown";
+}
+
+/// One sentence for people, without a full stop.
+inline const char* text(Refusal r) {
+  switch (r) {
+    case Refusal::none:
+      return "accepted";
+    case Refusal::truncated:
+      return "the image is truncated";
+    case Refusal::bad_magic:
+      return "not a flexcomp parameter image";
+    case Refusal::schema:
+      return "the image's schema is not known to this controller";
+    case Refusal::bad_length:
+      return "the image's lengths do not add up";
+    case Refusal::checksum:
+      return "the image's checksum is wrong";
+    case Refusal::wrong_robot:
+      return "the image is for another robot";
+    case Refusal::wrong_nominal:
+      return "the image is for another nominal geometry";
+    case Refusal::unknown_record:
+      return "the image has a record type that is not known";
+    case Refusal::unknown_basis:
+      return "the image has a basis that the controller does not evaluate";
+    case Refusal::bad_place:
+      return "the image has a term at a place that the controller does not have";
+    case Refusal::bad_value:
+      return "the image has a value or an index out of range";
+    case Refusal::too_many_terms:
+      return "the image has more terms than the controller holds";
+    case Refusal::table_too_large:
+      return "the image has more table values than the controller holds";
+    case Refusal::implausible:
+      return "the image would move the tool farther than is plausible";
+    case Refusal::mounting:
+      return "link_gravity needs gravity along the axis of joint 1";
+    case Refusal::too_long:
+      return "the image is longer than the staging memory";
+    case Refusal::stale_sequence:
+      return "the image's sequence is not above the active one";
+  }
+  return "unknown refusal";
+}
+
+}  // namespace flexcomp
+
+#endif
