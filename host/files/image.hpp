@@ -1,0 +1,36 @@
+/// \file
+/// A calibration as the bytes that a controller takes, and back.
+#ifndef FLEXCOMP_HOST_FILES_IMAGE_HPP
+#define FLEXCOMP_HOST_FILES_IMAGE_HPP
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "files/calibration_file.hpp"
+#include "files/robot_file.hpp"
+#include "flexcomp/status.hpp"
+
+namespace flexcomp::host {
+
+struct ImageOptions {
+  bool allow_unnamed = false;  ///< push what was found but not understood
+};
+
+/// The parameter image of a calibration, bound to the robot. Left out: what belongs to the measurement (base_drift,
+/// readout_lag, reflector_slip), and the base where frames were fitted. Instances and tables are numbered in order of
+/// appearance, so that image -> calibration file -> image is the identity on bytes.
+/// \throws InputError  unnamed effects (unless allowed), base or tool terms above 20 mm or 2 degrees, terms that the
+///                     core refuses
+std::vector<std::uint8_t> make_image(const Calibration& calibration, const RobotFile& robot, std::uint32_t sequence,
+                                     const ImageOptions& options = {});
+
+/// Reads an image back into named terms. `source` stands for the file in messages (a file or a bus).
+/// \throws InputError  truncated, altered, for another robot, or with terms that the catalogue cannot name
+Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const RobotFile& robot,
+                                   const std::string& source);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,43 @@
+/// \file
+/// What was measured, whatever the instrument, as poses or positions with their uncertainty.
+#ifndef FLEXCOMP_HOST_MEASUREMENT_OBSERVATION_HPP
+#define FLEXCOMP_HOST_MEASUREMENT_OBSERVATION_HPP
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
+#include "flexcomp/robot.hpp"
+
+namespace flexcomp::host {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// One row in the measurement frame. Residuals are e_p = p_m - p_model and e_R = log(R R_modelᵀ), both in that frame.
+struct Observation {
+  std::array<double, joint_count> q_rad{};
+  Context<double, joint_count> context;
+  bool has_orientation = false;
+  Eigen::Vector3d p_m = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  /// whitening * [e_p; e_R] has unit covariance; for positions only the upper left 3x3 block is not zero.
+  Matrix6d whitening = Matrix6d::Zero();
+  std::size_t line = 0;
+  double misfit_chi2 = 0;        ///< of the reflector points to the template
+  std::size_t misfit_dof = 0;    ///< 0: no reflectors
+};
+
+/// All rows of a data file as observations. Reflector points are fitted to the robot file's template, else to one that is
+/// estimated over all rows (its gauge, model.md section 6, is then part of E). Rows whose misfit has a probability below
+/// 1e-6 are named in `warnings`, with the reflector.
+/// \throws InputError  nothing measured; reflectors on one line; a template without the D that the data have
+std::vector<Observation> observe(const DataFile& data, const RobotFile& robot,
+                                 std::vector<std::string>* warnings = nullptr);
+
+}  // namespace flexcomp::host
+
+#endif
