@@ -30,6 +30,16 @@ int flexcomp_program() asm("main");
 /// A pure virtual call would be a programming error; without this the C++ library brings its own terminate.
 [[noreturn]] void __cxa_pure_virtual() { flexcomp_board_fault(); }
 
-/// newlib's assert and abort end here instead of pulling in signals and printing.
+/// What newlib's assert() calls, which Eigen's assertions use. newlib's own prints, and brings a heap to do so.
+[[noreturn]] void __assert_func(const char* file, int, const char*, const char* condition) {
+  flexcomp::boards::write("assertion failed: ");
+  flexcomp::boards::write(condition);
+  flexcomp::boards::write(" in ");
+  flexcomp::boards::write(file);
+  flexcomp::boards::write("\n");
+  flexcomp::boards::exit(98);
+}
+
+/// newlib's abort would pull in signals.
 [[noreturn]] void abort() { flexcomp_board_fault(); }
 }
