@@ -17,7 +17,8 @@ constexpr bool in_float = sizeof(Scalar) == 4;
 constexpr float pose_tolerance = 1e-6F;
 constexpr float joint_tolerance = 4e-6F;
 
-bool fail(const char* what, std::size_t command, std::size_t number, std::uint64_t expected, std::uint64_t got) {
+bool fail(const char* what, std::size_t command, std::size_t number, std::uint64_t expected,
+          std::uint64_t got) {
   flexcomp::boards::write(what);
   flexcomp::boards::write(": command ");
   flexcomp::boards::write_hex(command);
@@ -45,7 +46,8 @@ bool images_agree() {
   if (crc != golden::image_crc) return fail("CRC of the image", 0, 0, golden::image_crc, crc);
   if constexpr (!in_float) {
     static selftest::Image image;
-    if (selftest::make_image<Scalar>(image) != image.size()) return fail("size of the image", 0, 0, image.size(), 0);
+    if (selftest::make_image<Scalar>(image) != image.size())
+      return fail("size of the image", 0, 0, image.size(), 0);
     for (std::size_t k = 0; k < image.size(); ++k) {
       if (image[k] != bytes[k]) return fail("byte of the image", 0, k, bytes[k], image[k]);
     }
@@ -70,7 +72,8 @@ bool results_agree() {
         const float off = got < exact ? exact - got : got - exact;
         const bool joint = i >= 12;
         if (joint && static_cast<flexcomp::StepStatus>(status) != flexcomp::StepStatus::ok) continue;
-        if (!(off <= (joint ? joint_tolerance : pose_tolerance))) return fail("tolerance", k, i, bits(exact), bits(got));
+        if (!(off <= (joint ? joint_tolerance : pose_tolerance)))
+          return fail("tolerance", k, i, bits(exact), bits(got));
       }
     }
   }

@@ -9,7 +9,8 @@ namespace {
 
 template <class S, class Bits>
 void print(const selftest::Results<S>& results, const char* type, const char* name) {
-  std::printf("constexpr %s %s[%zu][%zu] = {\n", type, name, selftest::command_count, selftest::numbers_per_command);
+  std::printf("constexpr %s %s[%zu][%zu] = {\n", type, name, selftest::command_count,
+              selftest::numbers_per_command);
   for (const auto& row : results.numbers) {
     std::printf("    {");
     for (std::size_t i = 0; i < row.size(); ++i) {
@@ -44,14 +45,19 @@ int main() {
 
   std::printf(
       "#pragma once\n"
-      "// Printed by print_golden.cpp on the host; \"cmake --build --preset host --target golden\" writes it anew.\n"
+      "// Printed by print_golden.cpp on the host; \"cmake --build --preset host --target golden\" writes it "
+      "anew.\n"
       "// clang-format off\n"
       "#include <cstdint>\n\n#include \"selftest.hpp\"\n\nnamespace golden {\n\n");
   std::printf("constexpr std::uint32_t image_crc = 0x%08" PRIx32 ";\n",
               flexcomp::load_u32(image.data() + image.size() - flexcomp::image::crc_bytes));
   std::printf("constexpr selftest::Image image = {{");
   for (std::size_t k = 0; k < image.size(); ++k)
-    std::printf("%s0x%02x", k == 0 ? "\n    " : k % 24 == 0 ? ",\n    " : ", ", static_cast<unsigned>(image[k]));
+    std::printf("%s0x%02x",
+                k == 0        ? "\n    "
+                : k % 24 == 0 ? ",\n    "
+                              : ", ",
+                static_cast<unsigned>(image[k]));
   std::printf("}};\n\n");
   print<double, std::uint64_t>(in_double, "std::uint64_t", "in_double");
   print_status(in_double, "status_in_double");

@@ -51,21 +51,36 @@ struct Entry {
 /// Table 1, with a compliance of 1 / K (K in N·mm/rad there), the lever's far joints of the link weight, and one
 /// curve on joint 1, so that a table is in the image as well.
 constexpr Entry entries[] = {
-    {1, 0, Basis::one, 0, 0, -0.08 * degree}, {1, 1, Basis::one, 0, 0, -0.4 * mm},
-    {1, 2, Basis::one, 0, 0, 0.09 * mm},      {1, 3, Basis::one, 0, 0, 0.03 * degree},
-    {2, 0, Basis::one, 0, 0, -0.04 * degree}, {2, 2, Basis::one, 0, 0, -0.05 * mm},
-    {2, 3, Basis::one, 0, 0, 0.02 * degree},  {2, 4, Basis::one, 0, 0, 0.03 * degree},
-    {3, 0, Basis::one, 0, 0, 0.05 * degree},  {3, 1, Basis::one, 0, 0, 0.2 * mm},
-    {3, 2, Basis::one, 0, 0, -0.1 * mm},      {3, 3, Basis::one, 0, 0, -0.05 * degree},
-    {4, 0, Basis::one, 0, 0, 0.03 * degree},  {4, 1, Basis::one, 0, 0, -0.1 * mm},
-    {4, 2, Basis::one, 0, 0, 0.06 * mm},      {4, 3, Basis::one, 0, 0, -0.008 * degree},
-    {5, 0, Basis::one, 0, 0, 0.06 * degree},  {5, 1, Basis::one, 0, 0, 0.1 * mm},
-    {5, 2, Basis::one, 0, 0, -0.08 * mm},     {5, 3, Basis::one, 0, 0, 0.01 * degree},
-    {6, 0, Basis::one, 0, 0, -0.1 * degree},  {6, 1, Basis::one, 0, 0, -0.3 * mm},
-    {6, 2, Basis::one, 0, 0, 0.03 * mm},      {6, 3, Basis::one, 0, 0, 0.07 * degree},
-    {0, 0, Basis::one, 0, 0, 0.3 * mm},       {0, 1, Basis::one, 0, 0, -0.2 * mm},
-    {0, 2, Basis::one, 0, 0, 0.1 * mm},       {0, 3, Basis::one, 0, 0, 0.02 * degree},
-    {0, 4, Basis::one, 0, 0, 0.01 * degree},  {0, 5, Basis::one, 0, 0, 0.01 * degree},
+    {1, 0, Basis::one, 0, 0, -0.08 * degree},
+    {1, 1, Basis::one, 0, 0, -0.4 * mm},
+    {1, 2, Basis::one, 0, 0, 0.09 * mm},
+    {1, 3, Basis::one, 0, 0, 0.03 * degree},
+    {2, 0, Basis::one, 0, 0, -0.04 * degree},
+    {2, 2, Basis::one, 0, 0, -0.05 * mm},
+    {2, 3, Basis::one, 0, 0, 0.02 * degree},
+    {2, 4, Basis::one, 0, 0, 0.03 * degree},
+    {3, 0, Basis::one, 0, 0, 0.05 * degree},
+    {3, 1, Basis::one, 0, 0, 0.2 * mm},
+    {3, 2, Basis::one, 0, 0, -0.1 * mm},
+    {3, 3, Basis::one, 0, 0, -0.05 * degree},
+    {4, 0, Basis::one, 0, 0, 0.03 * degree},
+    {4, 1, Basis::one, 0, 0, -0.1 * mm},
+    {4, 2, Basis::one, 0, 0, 0.06 * mm},
+    {4, 3, Basis::one, 0, 0, -0.008 * degree},
+    {5, 0, Basis::one, 0, 0, 0.06 * degree},
+    {5, 1, Basis::one, 0, 0, 0.1 * mm},
+    {5, 2, Basis::one, 0, 0, -0.08 * mm},
+    {5, 3, Basis::one, 0, 0, 0.01 * degree},
+    {6, 0, Basis::one, 0, 0, -0.1 * degree},
+    {6, 1, Basis::one, 0, 0, -0.3 * mm},
+    {6, 2, Basis::one, 0, 0, 0.03 * mm},
+    {6, 3, Basis::one, 0, 0, 0.07 * degree},
+    {0, 0, Basis::one, 0, 0, 0.3 * mm},
+    {0, 1, Basis::one, 0, 0, -0.2 * mm},
+    {0, 2, Basis::one, 0, 0, 0.1 * mm},
+    {0, 3, Basis::one, 0, 0, 0.02 * degree},
+    {0, 4, Basis::one, 0, 0, 0.01 * degree},
+    {0, 5, Basis::one, 0, 0, 0.01 * degree},
     {1, 0, Basis::load_torque, 0, 0, 1e3 / 1.47e10},
     {2, 0, Basis::load_torque, 1, 0, 1e3 / 6.67e7},
     {3, 0, Basis::load_torque, 2, 0, 1e3 / 3.13e7},
@@ -81,10 +96,10 @@ constexpr std::size_t entry_count = sizeof entries / sizeof entries[0];
 constexpr double curve[] = {0, 1.0e-4, 0, -1.0e-4, 5.0e-5, -5.0e-5};
 constexpr std::size_t curve_size = sizeof curve / sizeof curve[0];
 
-constexpr std::size_t image_bytes = flexcomp::image::header_bytes + flexcomp::image::crc_bytes +
-                                    flexcomp::image::record_head_bytes + flexcomp::image::table_head_bytes +
-                                    8 * curve_size +
-                                    entry_count * (flexcomp::image::record_head_bytes + flexcomp::image::term_bytes);
+constexpr std::size_t image_bytes =
+    flexcomp::image::header_bytes + flexcomp::image::crc_bytes + flexcomp::image::record_head_bytes +
+    flexcomp::image::table_head_bytes + 8 * curve_size +
+    entry_count * (flexcomp::image::record_head_bytes + flexcomp::image::term_bytes);
 using Image = std::array<std::uint8_t, image_bytes>;
 
 /// The image of the entries; needs a scalar that holds their values (double). 0 where it does not fit.
@@ -120,7 +135,7 @@ inline std::size_t make_image(Image& image) {
 /// Joint commands in 1/64 rad, which float and double hold exactly: ordinary poses, the wrist singularity (joint 5
 /// at 0), the stretched arm (joint 3 at 0) and one beyond a limit.
 constexpr int commands[][6] = {
-    {0, 0, 64, 0, 64, 0},       {32, -40, 70, 50, -60, 10},  {-100, 60, 50, -120, 80, 200},
+    {0, 0, 64, 0, 64, 0},       {32, -40, 70, 50, -60, 10},   {-100, 60, 50, -120, 80, 200},
     {150, 100, -90, 17, 33, 5}, {-180, -120, 140, 90, 45, 7}, {64, 20, 100, 250, 100, -250},
     {10, 30, 60, 20, 0, 10},    {5, 15, 0, 30, 40, 20},       {12, 24, 36, 48, 200, 60}};
 constexpr std::size_t command_count = sizeof commands / sizeof commands[0];
