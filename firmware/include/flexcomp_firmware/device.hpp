@@ -1,0 +1,65 @@
+/// \file
+/// The controller's side of the wire without a bus: parameter store, control cycle and probe behind the records of
+/// flexcomp/wire/store_state.hpp. The bus servers talk to this.
+#ifndef FLEXCOMP_FIRMWARE_DEVICE_HPP
+#define FLEXCOMP_FIRMWARE_DEVICE_HPP
+
+#include <array>
+#include <cstdint>
+
+#include "flexcomp/wire/store_state.hpp"
+#include "flexcomp_firmware/config.hpp"
+#include "flexcomp_firmware/control.hpp"
+#include "flexcomp_firmware/store.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+struct DeviceSettings {
+  ControlSettings control{};
+  StoreSettings store{};
+  std::uint32_t cycle_us = 1000;  ///< period of the control cycle, told to clients
+};
+
+/// One arm. step() belongs to the control cycle's thread or interrupt, everything else to the background's one.
+class Device {
+ public:
+  Device(const Robot& robot, const Storage& storage, const DeviceSettings& settings);
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  StepResult step(const Joints& q_command_rad, const FirmwareContext& context) {
+    return cycle_.step(q_command_rad, context);
+  }
+
+  /// What the active set makes of one command, with an empty state (no fade; directions from the request):
+  /// compensate() of the core and nothing else, so that it equals the host's answer to the last bit.
+  wire::ProbeResponse probe(const wire::ProbeRequest& request) const;
+
+  /// The request's joint command with the robot's default context.
+  wire::ProbeRequest with_default_context(const wire::ProbeRequest& request) const;
+
+  wire::Capability capability() const;
+  wire::Status status() const;
+
+  /// Correction of a joint in the last control cycle; of any joint since the start for joint = 6. deg.
+  float correction_deg(std::size_t joint) const;
+
+  Store& store() { return store_; }
+  const Store& store() const { return store_; }
+  const ControlCycle& cycle() const { return cycle_; }
+  const Robot& robot() const { return robot_; }
+  const DeviceSettings& settings() const { return settings_; }
+
+ private:
+  const Robot robot_;
+  const DeviceSettings settings_;
+  ParameterSets sets_{};
+  ControlCycle cycle_;
+  Store store_;
+};
+
+}  // namespace firmware
+}  // namespace flexcomp
+
+#endif

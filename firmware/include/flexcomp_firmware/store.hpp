@@ -1,0 +1,193 @@
+/// \file
+/// The parameter store: takes in a parameter image, checks it, writes it to non-volatile memory, makes it active,
+/// and brings it back after a power loss. One machine behind every bus.
+///
+/// Non-volatile memory has two slots. A slot holds the image from its first byte and, in its last 32 bytes, a seal:
+///
+///      0  "FLXS"
+///      4  u32 bytes of the image
+///      8  u32 sequence
+///     12  u32 CRC-32 of the image (its last word)
+///     16  12 bytes 0
+///     28  u32 CRC-32 of the 28 bytes before
+///
+/// The seal is written last, when the image has been read back, so a slot counts only if everything in it is in
+/// order; the power may go at any byte. A set on trial has no seal until it is confirmed. The active slot is never
+/// written; rollback erases it, because then the other one is all there is at the next start.
+///
+/// Everything here runs in the background, in one thread; only the handover word and the models that the cycle does
+/// not use are shared with the control cycle.
+#ifndef FLEXCOMP_FIRMWARE_STORE_HPP
+#define FLEXCOMP_FIRMWARE_STORE_HPP
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/image.hpp"
+#include "flexcomp/status.hpp"
+#include "flexcomp/wire/store_state.hpp"
+#include "flexcomp_firmware/config.hpp"
+#include "flexcomp_firmware/control.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+enum class StorageResult : std::int8_t {
+  failed = -1,
+  done = 0,
+  busy =
+      1,  ///< erase and write only: nothing has been done yet, or it is under way; the same call comes again
+};
+
+/// Non-volatile memory as the store needs it: two slots (0 and 1) of slot_bytes each. The hooks are called from the
+/// background only. Where a hook is null the store keeps nothing and refuses to commit.
+struct Storage {
+  void* user = nullptr;
+  /// Reads `size` bytes from `offset` of a slot; an unwritten slot may read as anything.
+  StorageResult (*read)(void* user, unsigned slot, std::uint32_t offset, std::uint8_t* to,
+                        std::uint32_t size) = nullptr;
+  /// Makes a whole slot writable. When power goes meanwhile, any of its bytes may be old or erased.
+  StorageResult (*erase)(void* user, unsigned slot) = nullptr;
+  /// Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot; each byte is
+  /// written once between two erases. Done means that the bytes survive a power loss.
+  StorageResult (*write)(void* user, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
+                         std::uint32_t size) = nullptr;
+};
+
+struct StoreSettings {
+  /// A set that changes the pose at any of the probe poses by more than this is refused as implausible.
+  Scalar plausible_position_m = Scalar(0.05);
+  Scalar plausible_orientation_rad = Scalar(0.1);
+  /// Control cycles of a trial where the command names none.
+  std::uint32_t trial_cycles = 60000;
+  /// A transfer on which nothing has come for so long is dropped, ms.
+  std::uint32_t staging_timeout_ms = 30000;
+};
+
+/// Who speaks: a bus, or one connection of it. What one of them stages no other one may touch.
+using Origin = std::uint8_t;
+constexpr Origin nobody = 0;
+
+class Store {
+ public:
+  Store(const Robot& robot, ParameterSets& sets, const Storage& storage, const StoreSettings& settings);
+  Store(const Store&) = delete;
+  Store& operator=(const Store&) = delete;
+
+  /// Before the control cycle starts: the highest valid sequence becomes active, else the other slot with the fault
+  /// `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again.
+  void boot();
+
+  /// One command of the wire. What it ended with is in status() as well.
+  wire::Answer run(wire::Command command, std::uint32_t argument, Origin origin);
+
+  /// begin() for a transfer whose length is not known yet: end() follows.
+  wire::Answer begin_unknown(Origin origin);
+
+  /// Bytes of the image from `offset`. They may overlap what came before but leave no gap.
+  wire::Answer write(std::uint32_t offset, const std::uint8_t* bytes, std::uint32_t size, Origin origin);
+
+  /// The length of a transfer that began without one is what has come so far.
+  wire::Answer end(Origin origin);
+
+  /// The connection is gone: drops what it has staged. A commit under way is not touched.
+  void disconnect(Origin origin);
+
+  /// Reads the active image as it lies in its slot. False beyond its end, without a set, or where reading fails.
+  bool read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size);
+
+  /// Goes on with what is under way; at most one storage call of 256 bytes each time. now_ms wraps.
+  void poll(std::uint32_t now_ms);
+
+  /// Fills what the store knows of the status record.
+  void status(wire::Status& out) const;
+
+  /// The prepared set that is active, or null; valid until the next poll() or run().
+  const FirmwareModel* active_model() const;
+
+  std::uint32_t active_bytes() const { return active_.bytes; }
+  std::uint32_t active_sequence() const { return active_.sequence; }
+  std::uint16_t active_slot() const { return active_.slot; }
+  std::uint16_t faults() const { return faults_; }
+  std::uint32_t announced_bytes() const { return announced_; }
+  Refusal refusal() const { return refusal_; }
+  const StoreSettings& settings() const { return settings_; }
+  const Sha256Digest& nominal_hash() const { return nominal_hash_; }
+
+ private:
+  /// A set that is, or was, active.
+  struct Set {
+    std::uint32_t index = Handover::none;
+    std::uint16_t slot = wire::no_slot;
+    std::uint32_t sequence = 0;
+    std::uint32_t bytes = 0;
+    std::uint32_t crc = 0;
+  };
+  enum class Job : std::uint8_t {
+    none,
+    erase,          ///< commit: the inactive slot
+    write,          ///< commit: the image
+    compare,        ///< commit: read back
+    seal,           ///< commit or confirm: the seal
+    await_confirm,  ///< confirm: until the cycle has ended the trial
+    drop_active,    ///< rollback: erase the slot that is left behind
+    clear_other,    ///< restore: erase the inactive slot
+    clear_active,   ///< restore: then the active one
+  };
+
+  wire::Answer answer(wire::Answer a, std::uint32_t detail = 0);
+  wire::Answer refuse(Refusal r, std::uint32_t detail = 0);
+  wire::Answer begin(std::uint32_t length, Origin origin);
+  wire::Answer verify(Origin origin);
+  wire::Answer commit(Origin origin, bool trial, std::uint32_t cycles);
+  wire::Answer confirm();
+  wire::Answer rollback();
+  wire::Answer restore();
+  wire::Answer drop(Origin origin);
+  bool owns(Origin origin) const { return origin == owner_; }
+  void release();
+  bool free_model(std::uint32_t& index) const;
+  Refusal prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail);
+  bool plausible(const FirmwareModel& model, std::uint32_t& detail) const;
+  bool read_seal(unsigned slot, Set& set);
+  bool load(const Set& set);
+  void fail();
+  void finish(wire::Answer a);
+  void make_active(const Set& set);
+  void watch_trial();
+  void work();
+
+  const Robot robot_;
+  const Sha256Digest nominal_hash_;
+  ParameterSets& sets_;
+  const Storage storage_;
+  const StoreSettings settings_;
+
+  wire::StoreState state_ = wire::StoreState::idle;
+  wire::Answer answer_ = wire::Answer::accepted;
+  Refusal refusal_ = Refusal::none;
+  std::uint32_t detail_ = 0;
+  std::uint16_t faults_ = 0;
+  Origin owner_ = nobody;
+  bool length_known_ = true;
+  bool touched_ = false;
+  std::uint32_t touched_ms_ = 0;
+  std::uint32_t announced_ = 0;
+  std::uint32_t staged_ = 0;
+
+  Set active_{};
+  Set previous_{};  ///< what the other slot holds, or what a trial falls back to
+  Set incoming_{};  ///< what is verified, written or on trial
+  Job job_ = Job::none;
+  std::uint32_t progress_ = 0;
+  bool job_trial_ = false;
+  std::uint32_t job_trial_cycles_ = 0;
+
+  alignas(8) std::array<std::uint8_t, staging_bytes> staging_{};
+};
+
+}  // namespace firmware
+}  // namespace flexcomp
+
+#endif

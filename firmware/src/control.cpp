@@ -1,0 +1,146 @@
+#include "flexcomp_firmware/control.hpp"
+
+#include <cstring>
+
+#include "flexcomp/bytes.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+namespace {
+
+std::uint32_t float_bits(float v) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &v, sizeof bits);
+  return bits;
+}
+
+void count(std::atomic<std::uint32_t>& n) {
+  // One writer, so a load and a store are enough; no read-modify-write that some cores would have to retry.
+  n.store(n.load(std::memory_order_relaxed) + 1U, std::memory_order_relaxed);
+}
+
+Scalar sensible(Scalar v) { return is_finite(v) && v > Scalar(0) ? v : Scalar(0); }
+
+}  // namespace
+
+ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings)
+    : sets_(sets), settings_(settings) {
+  settings_.compensation.largest_correction_rad = sensible(settings.compensation.largest_correction_rad);
+  settings_.direction_band_rad = sensible(settings.direction_band_rad);
+  for (std::size_t j = 0; j < joints; ++j) {
+    lower_[j] = from_binary64<Scalar>(robot.limits[j].min_rad);
+    upper_[j] = from_binary64<Scalar>(robot.limits[j].max_rad);
+  }
+  if (settings_.fade_cycles != 0) fade_step_ = Scalar(1) / static_cast<Scalar>(settings_.fade_cycles);
+  if (settings_.direction_band_rad > Scalar(0)) band_inverse_ = Scalar(2) / settings_.direction_band_rad;
+}
+
+// A joint's direction follows its command like a body with friction that is dragged along (the stop operator of
+// hysteresis): it moves with the command between -1 and +1 and stays at the end that it has reached.
+void ControlCycle::track(const Joints& q) {
+  if (!tracking_) {
+    last_command_ = q;
+    tracking_ = true;
+    return;
+  }
+  for (std::size_t j = 0; j < joints; ++j) {
+    const Scalar move = q[j] - last_command_[j];
+    Scalar d = direction_[j];
+    if (settings_.direction_band_rad > Scalar(0)) {
+      d += move * band_inverse_;
+      if (d > Scalar(1)) d = Scalar(1);
+      if (d < Scalar(-1)) d = Scalar(-1);
+    } else if (move > Scalar(0)) {
+      d = Scalar(1);
+    } else if (move < Scalar(0)) {
+      d = Scalar(-1);
+    }
+    direction_[j] = d;
+  }
+  last_command_ = q;
+}
+
+void ControlCycle::publish(StepStatus status) {
+  count(publication_.cycles);
+  count(publication_.cycles_by_status[static_cast<std::size_t>(status)]);
+  publication_.last_status.store(static_cast<std::uint32_t>(status), std::memory_order_relaxed);
+  for (std::size_t j = 0; j < joints; ++j) {
+    const Scalar c = correction_[j];
+    publication_.correction_rad[j].store(float_bits(static_cast<float>(c)), std::memory_order_relaxed);
+    if (c > largest_) largest_ = c;
+    if (-c > largest_) largest_ = -c;
+  }
+  publication_.largest_correction_rad.store(float_bits(static_cast<float>(largest_)),
+                                            std::memory_order_relaxed);
+}
+
+StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context) {
+  bool changed = false;
+  const std::uint32_t index = sets_.handover.take(changed);
+  StepResult out{q_command_rad, StepStatus::refused};
+
+  bool finite = true;
+  for (const Scalar q : q_command_rad) finite = finite && is_finite(q);
+  if (!finite) {
+    if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
+    if (settings_.on_refusal == OnRefusal::hold_last_correction) {
+      for (std::size_t j = 0; j < joints; ++j) {
+        if (is_finite(out.q[j])) out.q[j] += correction_[j];
+      }
+    }
+    publish(out.status);
+    return out;
+  }
+  track(q_command_rad);
+
+  Source source = Source::pass;
+  if (index == Handover::none) {
+    out.status = StepStatus::no_set;
+  } else {
+    FirmwareContext tracked = context;
+    tracked.direction = direction_;
+    const Compensated<Scalar, joints> compensated =
+        compensate(sets_.models[index], q_command_rad, tracked, settings_.compensation);
+    out.q = compensated.q;
+    out.status = compensated.status;
+    if (out.status != StepStatus::refused) {
+      source = Source::set;
+    } else if (settings_.on_refusal == OnRefusal::hold_last_correction) {
+      source = Source::hold;
+    }
+  }
+
+  if (source == Source::hold) {
+    for (std::size_t j = 0; j < joints; ++j) out.q[j] = q_command_rad[j] + correction_[j];
+    fade_left_ = 0;
+  } else {
+    if (changed || source != source_) {
+      for (std::size_t j = 0; j < joints; ++j) kept_[j] = correction_[j] - (out.q[j] - q_command_rad[j]);
+      fade_left_ = settings_.fade_cycles;
+    }
+    if (fade_left_ != 0) {
+      const Scalar v = static_cast<Scalar>(fade_left_) * fade_step_;
+      const Scalar weight = v * v * (Scalar(3) - Scalar(2) * v);
+      for (std::size_t j = 0; j < joints; ++j) {
+        Scalar q = out.q[j] + kept_[j] * weight;
+        // What fades must not push a joint beyond a limit that the command itself respects.
+        const Scalar low = q_command_rad[j] < lower_[j] ? q_command_rad[j] : lower_[j];
+        const Scalar high = q_command_rad[j] > upper_[j] ? q_command_rad[j] : upper_[j];
+        if (q < low || q > high) {
+          q = q < low ? low : high;
+          if (source == Source::set) out.status = StepStatus::at_limit;
+        }
+        out.q[j] = q;
+      }
+      --fade_left_;
+    }
+    for (std::size_t j = 0; j < joints; ++j) correction_[j] = out.q[j] - q_command_rad[j];
+  }
+  source_ = source;
+  publish(out.status);
+  return out;
+}
+
+}  // namespace firmware
+}  // namespace flexcomp

@@ -1,0 +1,118 @@
+#include "flexcomp_firmware/device.hpp"
+
+#include <cstring>
+
+#include "flexcomp/compensate.hpp"
+#include "flexcomp/image.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+namespace {
+
+/// binary64 bits as they came over the wire to the scalar computed with.
+Scalar scalar(std::uint64_t bits) { return from_binary64<Scalar>(double_of(bits)); }
+
+float float_of(std::uint32_t bits) {
+  float v;
+  std::memcpy(&v, &bits, sizeof v);
+  return v;
+}
+
+}  // namespace
+
+Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings& settings)
+    : robot_(robot),
+      settings_(settings),
+      cycle_(robot, sets_, settings.control),
+      store_(robot, sets_, storage, settings.store) {}
+
+wire::ProbeRequest Device::with_default_context(const wire::ProbeRequest& request) const {
+  const FirmwareContext context = default_context<Scalar>(robot_);
+  wire::ProbeRequest out;
+  out.q_rad = request.q_rad;
+  out.payload_kg = to_binary64_bits(context.payload_kg);
+  for (std::size_t k = 0; k < 3; ++k) out.payload_com_m[k] = to_binary64_bits(context.payload_com_m[k]);
+  out.temperature_c = to_binary64_bits(context.temperature_c);
+  return out;
+}
+
+wire::ProbeResponse Device::probe(const wire::ProbeRequest& request) const {
+  Joints q;
+  FirmwareContext context;
+  for (std::size_t j = 0; j < joints; ++j) {
+    q[j] = scalar(request.q_rad[j]);
+    context.direction[j] = scalar(request.direction[j]);
+    context.relative_speed[j] = scalar(request.relative_speed[j]);
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    context.payload_com_m[k] = scalar(request.payload_com_m[k]);
+    context.force_n[k] = scalar(request.force_n[k]);
+  }
+  context.payload_kg = scalar(request.payload_kg);
+  context.temperature_c = scalar(request.temperature_c);
+  context.time_s = scalar(request.time_s);
+
+  wire::ProbeResponse out;
+  out.q_rad = request.q_rad;
+  out.slot = store_.active_slot();
+  out.sequence = store_.active_sequence();
+  const FirmwareModel* model = store_.active_model();
+  if (model == nullptr) {
+    out.status = static_cast<std::uint16_t>(StepStatus::no_set);
+    return out;
+  }
+  const Compensated<Scalar, joints> compensated =
+      compensate(*model, q, context, cycle_.settings().compensation);
+  out.status = static_cast<std::uint16_t>(compensated.status);
+  if (compensated.status == StepStatus::refused) return out;
+  const TargetResidual<Scalar> residual = target_residual(*model, compensated.q, q, context);
+  for (std::size_t j = 0; j < joints; ++j) out.q_rad[j] = to_binary64_bits(compensated.q[j]);
+  out.position_m = to_binary64_bits(residual.position_m);
+  out.orientation_rad = to_binary64_bits(residual.orientation_rad);
+  return out;
+}
+
+wire::Capability Device::capability() const {
+  wire::Capability c;
+  c.joints = static_cast<std::uint16_t>(joints);
+  c.scalar_bytes = static_cast<std::uint16_t>(sizeof(Scalar));
+  c.schema = static_cast<std::uint16_t>((image::schema_major << 8U) | image::schema_minor);
+  c.bases = (1U << basis_count) - 1U;
+  c.terms = static_cast<std::uint16_t>(FirmwareCapacity::terms);
+  c.tables = static_cast<std::uint16_t>(FirmwareCapacity::tables);
+  c.values = static_cast<std::uint32_t>(FirmwareCapacity::values);
+  c.image_bytes = staging_bytes;
+  c.cycle_us = settings_.cycle_us;
+  c.fade_cycles = cycle_.settings().fade_cycles;
+  c.firmware = firmware_version;
+  c.nominal_hash = store_.nominal_hash();
+  c.name_hash = robot_.name_hash;
+  c.plausible_position_m = to_binary64_bits(settings_.store.plausible_position_m);
+  c.plausible_orientation_rad = to_binary64_bits(settings_.store.plausible_orientation_rad);
+  c.largest_correction_rad = to_binary64_bits(cycle_.settings().compensation.largest_correction_rad);
+  return c;
+}
+
+wire::Status Device::status() const {
+  wire::Status s;
+  store_.status(s);
+  const ControlPublication& p = cycle_.publication();
+  s.cycles = p.cycles.load(std::memory_order_relaxed);
+  for (std::size_t k = 0; k < 6; ++k) {
+    s.cycles_by_status[k] = p.cycles_by_status[k].load(std::memory_order_relaxed);
+  }
+  s.last_status = static_cast<std::uint16_t>(p.last_status.load(std::memory_order_relaxed));
+  return s;
+}
+
+float Device::correction_deg(std::size_t joint) const {
+  constexpr float degrees = 57.29577951F;
+  const ControlPublication& p = cycle_.publication();
+  const std::atomic<std::uint32_t>& bits =
+      joint < joints ? p.correction_rad[joint] : p.largest_correction_rad;
+  return float_of(bits.load(std::memory_order_relaxed)) * degrees;
+}
+
+}  // namespace firmware
+}  // namespace flexcomp

@@ -1,0 +1,588 @@
+#include "flexcomp_firmware/store.hpp"
+
+#include <cstring>
+
+#include "flexcomp/compensate.hpp"
+#include "flexcomp/crc32.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+using wire::Answer;
+using wire::Command;
+using wire::StoreState;
+
+namespace {
+
+constexpr std::uint32_t seal_bytes = 32;
+constexpr std::uint32_t seal_offset = slot_bytes - seal_bytes;
+constexpr std::uint32_t unit_bytes = 32;    ///< non-volatile memory is written in multiples of this
+constexpr std::uint32_t chunk_bytes = 256;  ///< at most, per call
+constexpr std::uint8_t seal_magic[4] = {'F', 'L', 'X', 'S'};
+constexpr std::uint32_t shortest_image = image::header_bytes + image::crc_bytes;
+
+std::uint32_t rounded_up(std::uint32_t size) { return (size + unit_bytes - 1U) / unit_bytes * unit_bytes; }
+
+/// Joint readings spread evenly over the limits: multiples of an irrational number per joint (Roberts' R6 sequence)
+/// in 32-bit integers, so that every target takes the same poses.
+Scalar spread(std::uint32_t pose, std::size_t joint) {
+  constexpr std::uint32_t step[joints] = {0xE41F1F87U, 0xCB4B4E5BU, 0xB5297A4DU,
+                                          0xA1770F33U, 0x8FE3A4A7U, 0x8038F2C1U};
+  return static_cast<Scalar>((pose * step[joint]) >> 8U) * Scalar(1.0F / 16777216.0F);
+}
+
+/// The first term whose basis this controller does not evaluate.
+struct BasisFinder {
+  std::uint32_t id = 0;
+  Refusal table(const Table&, const std::uint8_t*) { return Refusal::none; }
+  Refusal term(const Term<Scalar>& t) {
+    if (static_cast<std::uint8_t>(t.basis) < basis_count) return Refusal::none;
+    id = static_cast<std::uint8_t>(t.basis);
+    return Refusal::unknown_basis;
+  }
+};
+
+/// A length in units of 1e-6, for the detail word; saturates.
+std::uint32_t micro(Scalar v) {
+  if (!(v < Scalar(4000))) return 0xFFFFFFFFU;
+  return v > Scalar(0) ? static_cast<std::uint32_t>(v * Scalar(1e6F)) : 0U;
+}
+
+}  // namespace
+
+Store::Store(const Robot& robot, ParameterSets& sets, const Storage& storage, const StoreSettings& settings)
+    : robot_(robot),
+      nominal_hash_(flexcomp::nominal_hash(robot)),
+      sets_(sets),
+      storage_(storage),
+      settings_(settings) {}
+
+Answer Store::answer(Answer a, std::uint32_t detail) {
+  answer_ = a;
+  detail_ = detail;
+  refusal_ = Refusal::none;
+  return a;
+}
+
+Answer Store::refuse(Refusal r, std::uint32_t detail) {
+  answer_ = Answer::refused;
+  detail_ = detail;
+  refusal_ = r;
+  return Answer::refused;
+}
+
+void Store::release() {
+  owner_ = nobody;
+  announced_ = 0;
+  staged_ = 0;
+  length_known_ = true;
+  state_ = StoreState::idle;
+}
+
+// --- start ----------------------------------------------------------------------------------------------------
+
+bool Store::read_seal(unsigned slot, Set& set) {
+  std::uint8_t seal[seal_bytes];
+  if (storage_.read == nullptr) return false;
+  if (storage_.read(storage_.user, slot, seal_offset, seal, seal_bytes) != StorageResult::done) {
+    faults_ |= wire::fault::storage;
+    return false;
+  }
+  if (std::memcmp(seal, seal_magic, sizeof seal_magic) != 0) return false;
+  if (crc32(seal, seal_bytes - 4) != load_u32(seal + seal_bytes - 4)) return false;
+  set.slot = static_cast<std::uint16_t>(slot);
+  set.bytes = load_u32(seal + 4);
+  set.sequence = load_u32(seal + 8);
+  set.crc = load_u32(seal + 12);
+  return set.bytes >= shortest_image && set.bytes <= staging_bytes;
+}
+
+/// Reads a sealed image into the staging memory, which must be idle, and prepares it in model set.index.
+bool Store::load(const Set& set) {
+  if (storage_.read(storage_.user, set.slot, 0, staging_.data(), set.bytes) != StorageResult::done) {
+    faults_ |= wire::fault::storage;
+    return false;
+  }
+  ImageHeader header;
+  std::uint32_t detail = 0;
+  const Refusal r = prepare(set.bytes, sets_.models[set.index], header, detail);
+  if (r != Refusal::none) {
+    refuse(r, detail);
+    return false;
+  }
+  return header.sequence == set.sequence && load_u32(staging_.data() + set.bytes - 4) == set.crc;
+}
+
+void Store::boot() {
+  Set found[2];
+  const bool sealed[2] = {read_seal(0, found[0]), read_seal(1, found[1])};
+  unsigned order[2] = {0, 1};
+  if (sealed[1] && (!sealed[0] || found[1].sequence > found[0].sequence)) {
+    order[0] = 1;
+    order[1] = 0;
+  }
+  bool damaged = false;
+  for (const unsigned slot : order) {
+    if (!sealed[slot]) continue;
+    Set& set = found[slot];
+    if (active_.index != Handover::none) {
+      // The other slot is only asked whether a rollback could use it; its model is prepared when it is needed.
+      set.index = 1;
+      if (load(set)) previous_ = set;
+      continue;
+    }
+    set.index = 0;
+    if (load(set)) {
+      make_active(set);
+      if (damaged) faults_ |= wire::fault::older_slot;
+    } else {
+      damaged = true;
+    }
+  }
+  previous_.index = Handover::none;
+  if (active_.index == Handover::none) {
+    faults_ |= wire::fault::no_valid_set;
+  } else {
+    answer(Answer::accepted);
+  }
+}
+
+// --- checks -----------------------------------------------------------------------------------------------------
+
+/// A model that the cycle neither uses nor may come to use.
+bool Store::free_model(std::uint32_t& index) const {
+  if (!sets_.handover.settled()) return false;
+  const std::uint32_t used = sets_.handover.in_use();
+  index = used == 0 ? 1 : 0;
+  return true;
+}
+
+Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail) {
+  detail = 0;
+  Refusal r = check_image(staging_.data(), size, nominal_hash_, robot_.name_hash, header);
+  if (r != Refusal::none) {
+    if (r == Refusal::schema) detail = header.schema_major;
+    if (r == Refusal::truncated || r == Refusal::bad_length) detail = header.total_bytes;
+    return r;
+  }
+  r = model_from_image(staging_.data(), size, robot_, model);
+  if (r == Refusal::unknown_basis) {
+    BasisFinder finder;
+    visit_image<Scalar>(staging_.data(), size, finder);
+    detail = finder.id;
+  }
+  if (r == Refusal::too_many_terms) detail = FirmwareCapacity::terms;
+  if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
+  if (r != Refusal::none) return r;
+  return plausible(model, detail) ? Refusal::none : Refusal::implausible;
+}
+
+/// Where the tool would go at 32 poses spread over the joint limits, against the nominal robot.
+bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
+  FirmwareContext context = default_context<Scalar>(robot_);
+  for (std::uint32_t pose = 1; pose <= 32; ++pose) {
+    Joints q;
+    for (std::size_t j = 0; j < joints; ++j) {
+      const Scalar low = from_binary64<Scalar>(robot_.limits[j].min_rad);
+      const Scalar high = from_binary64<Scalar>(robot_.limits[j].max_rad);
+      q[j] = low + (high - low) * spread(pose, j);
+      context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
+      context.relative_speed[j] = context.direction[j];
+    }
+    const TargetResidual<Scalar> change = target_residual(model, q, q, context);
+    if (!(change.position_m <= settings_.plausible_position_m)) {
+      detail = micro(change.position_m);
+      return false;
+    }
+    // The residual is the sine of the angle: beyond a right angle it gets smaller again.
+    Workspace<Scalar, joints> workspace;
+    const Pose<Scalar> nominal = nominal_forward(model, q);
+    const Pose<Scalar> flexible = forward(model, q, context, workspace);
+    const Scalar trace = dot<Scalar>(nominal.rotation.col(0), flexible.rotation.col(0)) +
+                         dot<Scalar>(nominal.rotation.col(1), flexible.rotation.col(1)) +
+                         dot<Scalar>(nominal.rotation.col(2), flexible.rotation.col(2));
+    if (!(change.orientation_rad <= settings_.plausible_orientation_rad && trace > Scalar(1))) {
+      detail = micro(change.orientation_rad);
+      return false;
+    }
+  }
+  return true;
+}
+
+// --- staging ----------------------------------------------------------------------------------------------------
+
+Answer Store::begin(std::uint32_t length, Origin origin) {
+  if (state_ == StoreState::trial) return answer(Answer::wrong_state);
+  if (state_ == StoreState::working || (state_ != StoreState::idle && !owns(origin)))
+    return answer(Answer::busy);
+  release();
+  if (length > staging_bytes) return refuse(Refusal::too_long, staging_bytes);
+  if (length == 0) return answer(Answer::bad_argument);
+  state_ = StoreState::receiving;
+  owner_ = origin;
+  announced_ = length;
+  touched_ = true;
+  // Memory is written in whole units: what pads the last one must not be what an earlier image left.
+  std::memset(staging_.data(), 0xFF, staging_.size());
+  return answer(Answer::accepted);
+}
+
+Answer Store::begin_unknown(Origin origin) {
+  const Answer a = begin(staging_bytes, origin);
+  length_known_ = a != Answer::accepted;
+  return a;
+}
+
+Answer Store::write(std::uint32_t offset, const std::uint8_t* bytes, std::uint32_t size, Origin origin) {
+  if (state_ != StoreState::idle && !owns(origin)) return answer(Answer::busy);
+  if (state_ != StoreState::receiving) return answer(Answer::wrong_state);
+  if (offset > staged_) return answer(Answer::bad_argument, staged_);
+  if (offset > announced_ || size > announced_ - offset) {
+    if (!length_known_) return refuse(Refusal::too_long, staging_bytes);
+    return answer(Answer::bad_argument, announced_);
+  }
+  std::memcpy(staging_.data() + offset, bytes, size);
+  if (offset + size > staged_) staged_ = offset + size;
+  touched_ = true;
+  return answer(Answer::accepted);
+}
+
+Answer Store::end(Origin origin) {
+  if (state_ != StoreState::receiving || !owns(origin)) return answer(Answer::wrong_state);
+  if (!length_known_) {
+    announced_ = staged_;
+    length_known_ = true;
+  }
+  if (staged_ != announced_) return answer(Answer::incomplete, staged_);
+  return answer(Answer::accepted);
+}
+
+Answer Store::verify(Origin origin) {
+  if (state_ == StoreState::working) return answer(Answer::busy);
+  if (state_ != StoreState::receiving && state_ != StoreState::verified) return answer(Answer::wrong_state);
+  if (!owns(origin)) return answer(Answer::busy);
+  if (state_ == StoreState::verified) return answer(Answer::accepted);
+  if (!length_known_ || staged_ != announced_) return answer(Answer::incomplete, staged_);
+  std::uint32_t index = 0;
+  if (!free_model(index)) return answer(Answer::busy);
+  ImageHeader header;
+  std::uint32_t detail = 0;
+  Refusal r = prepare(announced_, sets_.models[index], header, detail);
+  if (r == Refusal::none && header.sequence <= active_.sequence) {
+    r = Refusal::stale_sequence;
+    detail = active_.sequence;
+  }
+  if (r != Refusal::none) {
+    release();
+    return refuse(r, detail);
+  }
+  incoming_.index = index;
+  incoming_.bytes = announced_;
+  incoming_.sequence = header.sequence;
+  incoming_.crc = load_u32(staging_.data() + announced_ - 4);
+  state_ = StoreState::verified;
+  touched_ = true;
+  return answer(Answer::accepted);
+}
+
+Answer Store::drop(Origin origin) {
+  if (state_ == StoreState::working ||
+      (state_ != StoreState::idle && state_ != StoreState::trial && !owns(origin))) {
+    return answer(Answer::busy);
+  }
+  if (state_ == StoreState::trial) return answer(Answer::wrong_state);
+  release();
+  return answer(Answer::accepted);
+}
+
+void Store::disconnect(Origin origin) {
+  if ((state_ == StoreState::receiving || state_ == StoreState::verified) && owns(origin)) release();
+}
+
+// --- commands that write non-volatile memory -----------------------------------------------------------------------
+
+Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
+  if (state_ == StoreState::receiving) {
+    const Answer a = verify(origin);
+    if (a != Answer::accepted) return a;
+  }
+  if (state_ == StoreState::working) return answer(Answer::busy);
+  if (state_ != StoreState::verified) return answer(Answer::wrong_state);
+  if (!owns(origin)) return answer(Answer::busy);
+  if (storage_.read == nullptr || storage_.erase == nullptr || storage_.write == nullptr) {
+    release();
+    return answer(Answer::storage_failed);
+  }
+  incoming_.slot = active_.slot == 0 ? 1 : 0;
+  job_trial_ = trial;
+  job_trial_cycles_ = cycles != 0 ? cycles : settings_.trial_cycles;
+  if (job_trial_cycles_ == 0) job_trial_cycles_ = 1;
+  state_ = StoreState::working;
+  job_ = Job::erase;
+  progress_ = 0;
+  faults_ = static_cast<std::uint16_t>(faults_ & ~wire::fault::trial_reverted);
+  // From here on the other slot holds nothing that a rollback could use.
+  previous_ = Set{};
+  return answer(Answer::accepted);
+}
+
+Answer Store::confirm() {
+  if (state_ == StoreState::working) return answer(Answer::busy);
+  if (state_ != StoreState::trial) {
+    const bool late = state_ == StoreState::idle && (faults_ & wire::fault::trial_reverted) != 0;
+    return answer(late ? Answer::reverted : Answer::wrong_state);
+  }
+  if (!sets_.handover.settled()) return answer(Answer::busy);
+  sets_.handover.confirm();
+  state_ = StoreState::working;
+  job_ = Job::await_confirm;
+  return answer(Answer::accepted);
+}
+
+Answer Store::rollback() {
+  if (state_ == StoreState::working) return answer(Answer::busy);
+  if (state_ == StoreState::trial) {
+    // The trial has no seal, so nothing needs to be erased.
+    make_active(previous_);
+    previous_ = Set{};
+    state_ = StoreState::idle;
+    return answer(Answer::accepted);
+  }
+  if (state_ != StoreState::idle) return answer(Answer::busy);
+  if (previous_.slot == wire::no_slot) return answer(Answer::no_previous);
+  std::uint32_t index = 0;
+  if (!free_model(index)) return answer(Answer::busy);
+  incoming_ = previous_;
+  incoming_.index = index;
+  if (!load(incoming_)) {
+    previous_ = Set{};
+    return answer(Answer::no_previous);
+  }
+  state_ = StoreState::working;
+  job_ = Job::drop_active;
+  return answer(Answer::accepted);
+}
+
+Answer Store::restore() {
+  if (state_ == StoreState::trial) return answer(Answer::wrong_state);
+  if (state_ != StoreState::idle) return answer(Answer::busy);
+  if (storage_.erase == nullptr) return answer(Answer::storage_failed);
+  state_ = StoreState::working;
+  job_ = Job::clear_other;
+  previous_ = Set{};
+  return answer(Answer::accepted);
+}
+
+Answer Store::run(Command command, std::uint32_t argument, Origin origin) {
+  watch_trial();
+  switch (command) {
+    case Command::none:
+      break;
+    case Command::begin:
+      return begin(argument, origin);
+    case Command::verify:
+      return verify(origin);
+    case Command::commit:
+      return commit(origin, false, 0);
+    case Command::commit_trial:
+      return commit(origin, true, argument);
+    case Command::confirm:
+      return confirm();
+    case Command::rollback:
+      return rollback();
+    case Command::abort:
+      return drop(origin);
+    case Command::restore_defaults:
+      return restore();
+  }
+  return answer(Answer::unknown_command, static_cast<std::uint32_t>(command));
+}
+
+// --- background -------------------------------------------------------------------------------------------------
+
+void Store::make_active(const Set& set) {
+  sets_.handover.activate(set.index);
+  active_ = set;
+  if (set.index != Handover::none) {
+    faults_ = static_cast<std::uint16_t>(faults_ & ~(wire::fault::no_valid_set | wire::fault::older_slot));
+  } else {
+    faults_ |= wire::fault::no_valid_set;
+  }
+}
+
+void Store::finish(Answer a) {
+  job_ = Job::none;
+  release();
+  answer(a);
+}
+
+void Store::fail() {
+  faults_ |= wire::fault::storage;
+  finish(Answer::storage_failed);
+}
+
+/// Takes note of a trial that ran out in the cycle.
+void Store::watch_trial() {
+  if (state_ != StoreState::trial || !sets_.handover.settled() || !sets_.handover.reverted()) return;
+  // Posting the fallback again changes nothing for the cycle; it makes request and use the same word again.
+  make_active(previous_);
+  previous_ = Set{};
+  faults_ |= wire::fault::trial_reverted;
+  finish(Answer::reverted);
+}
+
+void Store::work() {
+  StorageResult r = StorageResult::done;
+  switch (job_) {
+    case Job::none:
+      return;
+    case Job::erase:
+      r = storage_.erase(storage_.user, incoming_.slot);
+      if (r == StorageResult::done) job_ = Job::write;
+      break;
+    case Job::write: {
+      const std::uint32_t end = rounded_up(incoming_.bytes);
+      const std::uint32_t size = end - progress_ < chunk_bytes ? end - progress_ : chunk_bytes;
+      r = storage_.write(storage_.user, incoming_.slot, progress_, staging_.data() + progress_, size);
+      if (r == StorageResult::done) progress_ += size;
+      if (progress_ == end) {
+        progress_ = 0;
+        job_ = Job::compare;
+      }
+      break;
+    }
+    case Job::compare: {
+      std::uint8_t chunk[chunk_bytes];
+      const std::uint32_t left = incoming_.bytes - progress_;
+      const std::uint32_t size = left < chunk_bytes ? left : chunk_bytes;
+      r = storage_.read(storage_.user, incoming_.slot, progress_, chunk, size);
+      if (r == StorageResult::busy) r = StorageResult::failed;
+      if (r == StorageResult::done && std::memcmp(chunk, staging_.data() + progress_, size) != 0) {
+        r = StorageResult::failed;
+      }
+      if (r != StorageResult::done) break;
+      progress_ += size;
+      if (progress_ != incoming_.bytes) break;
+      if (!job_trial_) {
+        job_ = Job::seal;
+        break;
+      }
+      previous_ = active_;
+      sets_.handover.activate_on_trial(incoming_.index, active_.index, job_trial_cycles_);
+      active_ = incoming_;
+      finish(Answer::accepted);
+      state_ = StoreState::trial;
+      break;
+    }
+    case Job::await_confirm:
+      if (!sets_.handover.settled()) return;
+      if (sets_.handover.reverted()) {
+        state_ = StoreState::trial;
+        job_ = Job::none;
+        watch_trial();
+        return;
+      }
+      job_trial_ = true;
+      job_ = Job::seal;
+      break;
+    case Job::seal: {
+      std::uint8_t seal[seal_bytes] = {};
+      std::memcpy(seal, seal_magic, sizeof seal_magic);
+      store_u32(seal + 4, incoming_.bytes);
+      store_u32(seal + 8, incoming_.sequence);
+      store_u32(seal + 12, incoming_.crc);
+      store_u32(seal + seal_bytes - 4, crc32(seal, seal_bytes - 4));
+      r = storage_.write(storage_.user, incoming_.slot, seal_offset, seal, seal_bytes);
+      if (r == StorageResult::done) {
+        Set written;
+        if (!read_seal(incoming_.slot, written) || written.crc != incoming_.crc) r = StorageResult::failed;
+      }
+      if (r == StorageResult::failed && job_trial_) {
+        // Confirmed but not written down: what runs must be what the next start would bring.
+        make_active(previous_);
+        previous_ = Set{};
+      }
+      if (r != StorageResult::done) break;
+      if (!job_trial_) {
+        previous_ = active_;
+        make_active(incoming_);
+      }
+      previous_.index = Handover::none;
+      faults_ = 0;
+      finish(Answer::accepted);
+      break;
+    }
+    case Job::drop_active:
+      r = active_.slot == wire::no_slot ? StorageResult::done : storage_.erase(storage_.user, active_.slot);
+      if (r != StorageResult::done) break;
+      previous_ = Set{};
+      make_active(incoming_);
+      finish(Answer::accepted);
+      break;
+    case Job::clear_other:
+      r = storage_.erase(storage_.user, active_.slot == 0 ? 1U : 0U);
+      if (r == StorageResult::done) job_ = Job::clear_active;
+      break;
+    case Job::clear_active:
+      r = storage_.erase(storage_.user, active_.slot == 0 ? 0U : 1U);
+      if (r != StorageResult::done) break;
+      make_active(Set{});
+      faults_ = wire::fault::no_valid_set;
+      finish(Answer::accepted);
+      break;
+  }
+  if (r == StorageResult::failed) fail();
+}
+
+void Store::poll(std::uint32_t now_ms) {
+  if (touched_) {
+    touched_ = false;
+    touched_ms_ = now_ms;
+  }
+  watch_trial();
+  if (state_ == StoreState::working) {
+    work();
+  } else if ((state_ == StoreState::receiving || state_ == StoreState::verified) &&
+             now_ms - touched_ms_ >= settings_.staging_timeout_ms) {
+    release();
+  }
+}
+
+bool Store::read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size) {
+  if (active_.slot == wire::no_slot || storage_.read == nullptr) return false;
+  // Rollback and restore are erasing just this slot.
+  if (job_ == Job::drop_active || job_ == Job::clear_active) return false;
+  if (offset > active_.bytes || size > active_.bytes - offset) return false;
+  if (storage_.read(storage_.user, active_.slot, offset, to, size) != StorageResult::done) {
+    faults_ |= wire::fault::storage;
+    return false;
+  }
+  return true;
+}
+
+const FirmwareModel* Store::active_model() const {
+  // A trial that ran out a moment ago: the cycle already uses the other one.
+  std::uint32_t index = active_.index;
+  if (sets_.handover.settled()) index = sets_.handover.in_use();
+  return index == Handover::none ? nullptr : &sets_.models[index];
+}
+
+void Store::status(wire::Status& out) const {
+  out.state = static_cast<std::uint16_t>(state_);
+  out.answer = static_cast<std::uint16_t>(answer_);
+  out.refusal = static_cast<std::uint16_t>(refusal_);
+  out.faults = faults_;
+  out.detail = detail_;
+  out.active_slot = active_.slot;
+  out.settled = sets_.handover.settled() ? 1 : 0;
+  out.active_sequence = active_.sequence;
+  out.active_bytes = active_.bytes;
+  out.active_crc = active_.crc;
+  out.previous_sequence = previous_.sequence;
+  out.announced_bytes = announced_;
+  out.staged_bytes = staged_;
+  out.trial_cycles_left = sets_.handover.trial_cycles_left();
+}
+
+}  // namespace firmware
+}  // namespace flexcomp
