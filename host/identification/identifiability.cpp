@@ -1,0 +1,93 @@
+#include "identification/identifiability.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <random>
+
+namespace flexcomp::host {
+
+Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order, double tolerance) {
+  Elimination out;
+  Eigen::MatrixXd basis(matrix.rows(), static_cast<Eigen::Index>(order.size()));
+  Eigen::Index rank = 0;
+  std::vector<std::size_t> kept_in_order;
+  std::vector<std::size_t> lost;
+  double largest = 0;
+  for (const std::size_t c : order) largest = std::max(largest, matrix.col(static_cast<Eigen::Index>(c)).norm());
+  for (const std::size_t c : order) {
+    Eigen::VectorXd column = matrix.col(static_cast<Eigen::Index>(c));
+    const double norm = column.norm();
+    // Units are chosen such that columns are of like size: one 1e-12 smaller is rounding.
+    if (!(norm > 1e-12 * largest)) {
+      out.lost.push_back({c, {}});
+      continue;
+    }
+    column /= norm;
+    for (int pass = 0; pass < 2; ++pass) {  // twice is enough (Kahan, Parlett)
+      column -= basis.leftCols(rank) * (basis.leftCols(rank).transpose() * column);
+    }
+    if (rank < matrix.rows() && column.norm() > tolerance) {
+      basis.col(rank++) = column.normalized();
+      kept_in_order.push_back(c);
+    } else {
+      lost.push_back(c);
+    }
+  }
+  if (!lost.empty()) {
+    Eigen::MatrixXd kept(matrix.rows(), rank);
+    for (Eigen::Index k = 0; k < rank; ++k) {
+      kept.col(k) = matrix.col(static_cast<Eigen::Index>(kept_in_order[static_cast<std::size_t>(k)])).normalized();
+    }
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(kept);
+    for (const std::size_t c : lost) {
+      const Eigen::VectorXd share = qr.solve(matrix.col(static_cast<Eigen::Index>(c)).normalized());
+      LostColumn entry{c, {}};
+      const double most = share.cwiseAbs().maxCoeff();
+      for (Eigen::Index k = 0; k < rank; ++k) {
+        if (std::abs(share[k]) > 1e-3 * most) entry.with.push_back(kept_in_order[static_cast<std::size_t>(k)]);
+      }
+      out.lost.push_back(entry);
+    }
+  }
+  out.kept = kept_in_order;
+  std::sort(out.kept.begin(), out.kept.end());
+  std::sort(out.lost.begin(), out.lost.end(),
+            [](const LostColumn& a, const LostColumn& b) { return a.column < b.column; });
+  return out;
+}
+
+std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set) {
+  const std::size_t frames = unknowns.frames.size();
+  const auto rank = [&](std::size_t column) -> int {
+    if (column < frames) return 0;
+    const Term<double>& term = set.terms[unknowns.parameters[column - frames].terms.front()];
+    if (term.effect == Effect::geometric) {
+      if (term.place.body != body::base) return 2;
+      if (term.place.slot == slot::z) return 10;
+      return term.place.slot == slot::rz ? 11 : 1;
+    }
+    if (term.effect == Effect::joint_compliance) return term.place.body == 1 ? 12 : 3;
+    return term.effect == Effect::link_gravity ? 3 : 4;
+  };
+  std::vector<std::size_t> order(unknowns.count());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+  return order;
+}
+
+std::vector<Observation> random_observations(const RobotFile& robot, const std::vector<Observation>& like,
+                                             std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  std::vector<Observation> rows(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    rows[k] = like[k % like.size()];
+    rows[k].line = 0;
+    for (std::size_t i = 0; i < joint_count; ++i) {
+      const JointLimits& limits = robot.nominal.limits[i];
+      rows[k].q_rad[i] = std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(engine);
+    }
+  }
+  return rows;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,41 @@
+/// \file
+/// Which parameters can be known at all, which cannot, and with what each lost one is confounded.
+#ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
+#define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "files/robot_file.hpp"
+#include "identification/residuals.hpp"
+
+namespace flexcomp::host {
+
+/// A column that adds nothing to those before it, and the earlier ones that carry it (empty: it is zero).
+struct LostColumn {
+  std::size_t column = 0;
+  std::vector<std::size_t> with;
+};
+
+struct Elimination {
+  std::vector<std::size_t> kept;  ///< in the order of the columns
+  std::vector<LostColumn> lost;
+};
+
+/// Orthogonalises the columns in the given order and drops each one of which less than `tolerance` of its norm is left
+/// after projection onto those kept. Columns are scaled to norm 1 first, so nothing depends on noise or units.
+Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order, double tolerance = 1e-6);
+
+/// Preference where columns are confounded: frames, base x y rx ry, links 1 to 6, effects, and last what the paper loses
+/// too: base z, base rz, compliance of joint 1 (contract.md).
+std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set);
+
+/// Random poses inside the joint limits, measured as `like` was: same kind, and its contexts in turn.
+std::vector<Observation> random_observations(const RobotFile& robot, const std::vector<Observation>& like,
+                                             std::size_t count, std::uint64_t seed);
+
+}  // namespace flexcomp::host
+
+#endif

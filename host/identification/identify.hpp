@@ -1,0 +1,64 @@
+/// \file
+/// From measured rows to a calibration: what can be known, its values, and how far to trust them.
+#ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
+#define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "catalogue/catalogue.hpp"
+#include "files/calibration_file.hpp"
+#include "identification/estimator.hpp"
+#include "identification/frames.hpp"
+#include "identification/statistics.hpp"
+
+namespace flexcomp::host {
+
+struct IdentifyOptions {
+  ModelKind model = ModelKind::full;
+  FrameChoice frames = FrameChoice::by_distance;
+  bool force = false;      ///< go on where the data look like another unit or another arm
+  std::uint64_t seed = 1;  ///< of the 1,000 random poses that say what such data could know
+  EstimatorOptions estimator;
+};
+
+struct Before {
+  ErrorStatistics nominal_frames;
+  std::optional<ErrorStatistics> fitted_frames;  ///< nothing where the rows are too few for a frame
+};
+
+struct Identification {
+  Calibration calibration;
+  std::size_t parameters = 0;    ///< of the model, without F and E
+  std::size_t identifiable = 0;  ///< of these, in these data
+  std::size_t frame_parameters = 0;
+  std::vector<Confounded> confounded;  ///< cannot be told apart by any data of this kind
+  std::vector<std::string> missing;    ///< known to 1,000 random poses of this kind, but not to these data
+  /// Poses (rad) that would make the missing ones known, best first; empty where nothing is missing.
+  std::vector<std::array<double, joint_count>> cure;
+  Fit fit;
+  double condition = 0;  ///< of the whitened, scaled columns of the parameters
+  double o1 = 0;         ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
+  Before before;
+  ErrorStatistics after;
+  std::vector<RowResidual> residuals;  ///< after, per row
+  std::vector<std::size_t> outliers;   ///< rows that do not count in full, by index
+  /// Why the result must not be relied on; empty where it may.
+  std::vector<std::string> doubts;
+};
+
+/// \param source  names the data in messages
+/// \throws InputError  residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
+///                     millimetres, another arm), unless options.force; a fitted base above 20 mm or 2 degrees
+Identification identify(const RobotFile& robot, const std::vector<Observation>& rows, const std::string& source,
+                        const IdentifyOptions& options);
+
+/// Errors of the nominal arm, in nominal and in fitted frames. `model` (optional) receives the fitted frames.
+Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,244 @@
+#include "identification/residuals.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "flexcomp/forward.hpp"
+#include "flexcomp/identification.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr double frame_length_m = 1e-4;
+const double frame_angle_rad = radians(0.05);
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// d log(A exp(-w)) = -J w at w = 0 with e = log A: the inverse right Jacobian of SO(3) (Sola et al. 2018, Eq. 144).
+Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& e) {
+  const double angle = e.norm();
+  const Eigen::Matrix3d s = skew(e);
+  const double half = 0.5 * angle;
+  const double square = angle < 1e-4 ? 1.0 / 12 : (1 - half * std::cos(half) / std::sin(half)) / (angle * angle);
+  return Eigen::Matrix3d::Identity() + 0.5 * s + square * s * s;
+}
+
+struct Evaluated {
+  Pose<double> pose;      // Ftool in Fb
+  Eigen::Vector3d point;  // measured point in Fb
+  RowResidual residual;
+};
+
+RowResidual residual_of(const Estimate& estimate, const Observation& row, const Pose<double>& pose,
+                        const Eigen::Vector3d& point) {
+  RowResidual r;
+  r.position_m = row.p_m - (estimate.f.rotation * point + estimate.f.position);
+  if (row.has_orientation) {
+    const Eigen::Matrix3d model = estimate.f.rotation * pose.rotation * estimate.e.rotation;
+    r.orientation_rad = rotation_vector(row.R * model.transpose());
+  }
+  return r;
+}
+
+}  // namespace
+
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
+  const Eigen::AngleAxisd turn{Eigen::Quaterniond(rotation).normalized()};
+  return turn.axis() * (turn.angle() > pi ? turn.angle() - 2 * pi : turn.angle());
+}
+
+Eigen::Matrix3d rotation_of(const Eigen::Vector3d& w) {
+  const double angle = w.norm();
+  if (angle < 1e-300) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
+}
+
+std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
+                                   const std::vector<Observation>& rows) {
+  std::vector<RowResidual> out;
+  out.reserve(rows.size());
+  Workspace<double, joint_count> ws;
+  for (const Observation& row : rows) {
+    const Pose<double> pose = forward(model, row.q_rad, row.context, ws);
+    const Eigen::Vector3d point = pose.position + pose.rotation * (ws.point + estimate.e.position);
+    out.push_back(residual_of(estimate, row, pose, point));
+  }
+  return out;
+}
+
+Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
+                      const Unknowns& unknowns) {
+  const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
+  const Eigen::Index frame_columns = static_cast<Eigen::Index>(unknowns.frames.size());
+  const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
+  Linearised out;
+  out.residual = Eigen::VectorXd::Zero(6 * n);
+  out.derivative = Eigen::MatrixXd::Zero(6 * n, columns);
+  const Eigen::VectorXd units = units_of(unknowns, estimate.set);
+  Linearisation<double, joint_count> at;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> block(6, columns);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Observation& row = rows[static_cast<std::size_t>(k)];
+    linearise(model, row.q_rad, row.context, at);
+    const Eigen::Vector3d lever = at.pose.rotation * (at.loaded.point + estimate.e.position);
+    const Eigen::Vector3d point = at.pose.position + lever;
+    const RowResidual r = residual_of(estimate, row, at.pose, point);
+    const Eigen::Matrix3d& f = estimate.f.rotation;
+    block.setZero();
+    if (!unknowns.frames.empty()) {
+      Eigen::Matrix<double, 6, 12> all = Eigen::Matrix<double, 6, 12>::Zero();
+      all.block<3, 3>(0, 0).setIdentity();
+      all.block<3, 3>(0, 3) = -skew(f * point);
+      all.block<3, 3>(3, 3).setIdentity();
+      all.block<3, 3>(0, 6) = f * at.pose.rotation;
+      all.block<3, 3>(3, 9) = f * at.pose.rotation * estimate.e.rotation;
+      for (std::size_t i = 0; i < unknowns.frames.size(); ++i) {
+        block.col(static_cast<Eigen::Index>(i)) = all.col(static_cast<Eigen::Index>(unknowns.frames[i]));
+      }
+    }
+    for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
+      const Parameter& parameter = unknowns.parameters[p];
+      Vector6<double> column = Vector6<double>::Zero();
+      for (const std::size_t t : parameter.terms) {
+        const Term<double>& term = estimate.set.terms[t];
+        if (parameter.value) {
+          // A table's value acts through its weight at this reading.
+          const Table& table = estimate.set.tables[term.table];
+          const std::size_t index = *parameter.value - table.offset;
+          if (term.basis == Basis::curve) {
+            const auto weights = detail::curve_weights(row.q_rad[term.joint], table.size);
+            double weight = 0;
+            for (std::size_t i = 0; i < 4; ++i) {
+              if (weights.index[i] == index) weight += weights.w[i];
+            }
+            if (weight == 0) continue;
+            double factor = 1;
+            if (term.factor == Factor::load_torque) {
+              factor = detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(term.joint, 2),
+                                                    at.unloaded.frames.origin[term.joint]);
+            } else if (term.factor == Factor::temperature) {
+              factor = row.context.temperature_c - model.reference_temperature();
+            } else if (term.factor == Factor::payload) {
+              factor = row.context.payload_kg;
+            }
+            column += screw(model, at, term.place) * (term.coefficient * weight * factor);
+          } else {
+            const auto row_cell = detail::find_cell<double>(
+                estimate.set.values.data() + table.offset, table.rows,
+                detail::covariate<double, joint_count>(table.row_covariate, table.row_joint, row.q_rad, row.context));
+            const auto column_cell = detail::find_cell<double>(
+                estimate.set.values.data() + table.offset + table.rows, table.columns,
+                detail::covariate<double, joint_count>(table.column_covariate, table.column_joint, row.q_rad,
+                                                       row.context));
+            const std::size_t cell = index - table.rows - table.columns;
+            const std::size_t i = cell / table.columns;
+            const std::size_t j = cell % table.columns;
+            const auto share = [](std::size_t node, const detail::Cell<double>& c) {
+              return node == c.index ? 1 - c.fraction : (node == c.index + 1 ? c.fraction : 0.0);
+            };
+            const double weight = share(i, row_cell) * share(j, column_cell);
+            if (weight != 0) column += screw(model, at, term.place) * (term.coefficient * weight);
+          }
+        } else {
+          column += exact_column(model, at, term, row.context);
+        }
+      }
+      const Eigen::Index c = frame_columns + static_cast<Eigen::Index>(p);
+      const Eigen::Vector3d angular = column.tail<3>();
+      block.block<3, 1>(0, c) = f * (column.head<3>() + angular.cross(lever));
+      block.block<3, 1>(3, c) = f * angular;
+    }
+    if (row.has_orientation) {
+      block.bottomRows<3>() = inverse_right_jacobian(r.orientation_rad) * block.bottomRows<3>();
+    } else {
+      block.bottomRows<3>().setZero();
+    }
+    Vector6<double> stacked;
+    stacked << r.position_m, r.orientation_rad;
+    out.residual.segment<6>(6 * k) = row.whitening * stacked;
+    out.derivative.middleRows<6>(6 * k).noalias() = row.whitening * block;
+  }
+  out.derivative *= units.asDiagonal();
+  return out;
+}
+
+std::vector<std::size_t> free_frames(const std::vector<Observation>& rows) {
+  std::size_t count = 9;
+  for (const Observation& row : rows) {
+    if (row.has_orientation) count = 12;
+  }
+  std::vector<std::size_t> all(count);
+  for (std::size_t i = 0; i < count; ++i) all[i] = i;
+  return all;
+}
+
+double unit_of(const Parameter& parameter, const TermSet& set) {
+  const Term<double>& term = set.terms[parameter.terms.front()];
+  const bool length = (term.place.body >= 1 && term.place.body <= body::max_link)
+                          ? (term.place.slot == slot::d || term.place.slot == slot::a)
+                          : term.place.slot <= slot::z;
+  switch (term.effect) {
+    case Effect::geometric:
+      return length ? 1e-4 : radians(0.05);
+    case Effect::joint_compliance:
+      return 1e-5;
+    case Effect::link_gravity:
+      return 1e-3;
+    case Effect::nonlinear_compliance:
+      return 1e-6;
+    case Effect::readout_lag:
+      return 1e-3;
+    case Effect::link_bending:
+      return 1e-6;
+    case Effect::base_compliance:
+      return 1e-7;
+    case Effect::thermal_growth:
+      return 1e-5;
+    case Effect::base_drift:
+      return length ? 1e-5 / 3600 : radians(0.001) / 3600;
+    case Effect::payload_error:
+      return term.place.slot == slot::mass ? 0.1 : 0.01;
+    default:
+      return 1e-4;
+  }
+}
+
+Eigen::VectorXd units_of(const Unknowns& unknowns, const TermSet& set) {
+  Eigen::VectorXd units(static_cast<Eigen::Index>(unknowns.count()));
+  Eigen::Index k = 0;
+  for (const std::size_t i : unknowns.frames) units[k++] = i % 6 < 3 ? frame_length_m : frame_angle_rad;
+  for (const Parameter& p : unknowns.parameters) units[k++] = unit_of(p, set);
+  return units;
+}
+
+void move(Estimate& estimate, const Unknowns& unknowns, const Eigen::VectorXd& dx) {
+  const Eigen::VectorXd step = dx.cwiseProduct(units_of(unknowns, estimate.set));
+  Eigen::Index k = 0;
+  if (!unknowns.frames.empty()) {
+    Eigen::Matrix<double, 12, 1> frame = Eigen::Matrix<double, 12, 1>::Zero();
+    for (const std::size_t i : unknowns.frames) frame[static_cast<Eigen::Index>(i)] = step[k++];
+    estimate.f.position += frame.segment<3>(0);
+    estimate.f.rotation = Eigen::Quaterniond(rotation_of(frame.segment<3>(3)) * estimate.f.rotation).normalized();
+    estimate.e.position += frame.segment<3>(6);
+    estimate.e.rotation = Eigen::Quaterniond(estimate.e.rotation * rotation_of(frame.segment<3>(9))).normalized();
+  }
+  for (const Parameter& p : unknowns.parameters) p.set(estimate.set, p.get(estimate.set) + step[k++]);
+}
+
+std::vector<std::string> names_of(const Unknowns& unknowns) {
+  static const char* const axis[] = {"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
+  std::vector<std::string> names;
+  for (const std::size_t i : unknowns.frames) {
+    names.push_back(std::string(i < 6 ? "frame_f." : "frame_e.") + axis[i % 6]);
+  }
+  for (const Parameter& p : unknowns.parameters) names.push_back(p.name);
+  return names;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,78 @@
+/// \file
+/// Whitened residuals of measured poses against the model, with their exact derivatives.
+#ifndef FLEXCOMP_HOST_IDENTIFICATION_RESIDUALS_HPP
+#define FLEXCOMP_HOST_IDENTIFICATION_RESIDUALS_HPP
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "catalogue/host_model.hpp"
+#include "catalogue/term_set.hpp"
+#include "flexcomp/linear.hpp"
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+
+/// Everything that a fit moves: the coefficients, and the frames of the measurement.
+struct Estimate {
+  TermSet set;
+  Pose<double> f;  ///< Fb in the measurement frame
+  Pose<double> e;  ///< measured frame in Ftool
+};
+
+/// Which numbers a fit may move. Frames come first in every matrix, then the parameters.
+struct Unknowns {
+  /// Free numbers of the frames: 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E. Ascending; empty: frames are fixed.
+  std::vector<std::size_t> frames;
+  std::vector<Parameter> parameters;
+
+  std::size_t count() const { return frames.size() + parameters.size(); }
+};
+
+/// All numbers of F and E that these rows can see: 12, or 9 where no orientation was measured.
+std::vector<std::size_t> free_frames(const std::vector<Observation>& rows);
+
+/// Unwhitened residual of one row: e_p = p - p_model (m), e_R = log(R R_modelᵀ) (rad, zero where not measured), both in
+/// the measurement frame.
+struct RowResidual {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d orientation_rad = Eigen::Vector3d::Zero();
+};
+
+/// Residuals of all rows, in their order.
+std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
+                                   const std::vector<Observation>& rows);
+
+/// Whitened residuals and minus their derivative: residual(x + dx) = residual - derivative * dx to first order, each row
+/// block six high (three of them zero for positions). Columns are scaled by unit_of(): dx counts in these units.
+struct Linearised {
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd derivative;
+};
+
+Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
+                      const Unknowns& unknowns);
+
+/// The fixed unit in which a parameter's size is judged, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link
+/// gravity, the usual size of the effect otherwise (model.md section 7, effects.md).
+double unit_of(const Parameter& parameter, const TermSet& set);
+
+/// Units of all unknowns, frames first.
+Eigen::VectorXd units_of(const Unknowns& unknowns, const TermSet& set);
+
+/// Moves an estimate by dx, counted in units_of(); F and E on the manifold.
+void move(Estimate& estimate, const Unknowns& unknowns, const Eigen::VectorXd& dx);
+
+/// Names of all unknowns, frames first: frame_f.x_mm … frame_e.rz_deg, then the parameters.
+std::vector<std::string> names_of(const Unknowns& unknowns);
+
+/// log(R): rotation vector, rad, of any rotation up to half a turn.
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation);
+/// exp(w)
+Eigen::Matrix3d rotation_of(const Eigen::Vector3d& rotation_vector_rad);
+
+}  // namespace flexcomp::host
+
+#endif
