@@ -297,7 +297,8 @@ inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisatio
   const detail::LoadChange<S, N> change = detail::load_change(model, at, term.place, context);
   for (std::size_t k = 0; k < model.effect_count(); ++k) {
     const Term<S>& effect = model.effect(k);
-    if (!needs_loads(effect.basis, effect.factor)) continue;
+    // Effects at `point` move the measured point, not the pose that forward() gives.
+    if (!needs_loads(effect.basis, effect.factor) || effect.place.body == body::point) continue;
     const S d = detail::basis_change(model, effect, context, at.unloaded, change);
     r += screw(model, at, effect.place) * (effect.coefficient * d);
   }
