@@ -25,7 +25,19 @@ Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings&
     : robot_(robot),
       settings_(settings),
       cycle_(robot, sets_, settings.control),
-      store_(robot, sets_, storage, settings.store) {}
+      store_(robot, sets_, storage, settings.store) {
+  if (settings.name == nullptr) return;
+  // A name that is too long for the record is left out: half of it would be another name.
+  while (name_size_ < name_.size() && settings.name[name_size_] != 0) {
+    name_[name_size_] = settings.name[name_size_];
+    ++name_size_;
+  }
+  if (settings.name[name_size_] != 0) name_size_ = 0;
+}
+
+void Device::robot_record(wire::ByteOrder order, std::uint8_t* out) const {
+  wire::encode(robot_, name_.data(), name_size_, order, out);
+}
 
 wire::ProbeRequest Device::with_default_context(const wire::ProbeRequest& request) const {
   const FirmwareContext context = default_context<Scalar>(robot_);

@@ -44,6 +44,7 @@ enum class Block : std::uint8_t {
   probe_trigger,
   probe_response,
   people,
+  robot,
 };
 
 struct BlockPlace {
@@ -67,6 +68,7 @@ constexpr BlockPlace blocks[] = {
     {Block::probe_trigger, map::probe_trigger, 1, true, true},
     {Block::probe_response, map::probe_response, map::probe_response_registers, true, false},
     {Block::people, map::people, map::people_registers, true, false},
+    {Block::robot, map::robot, map::robot_registers, true, false},
 };
 
 const BlockPlace* block_at(std::uint32_t address) {
@@ -112,7 +114,7 @@ std::size_t refuse(std::uint8_t function, Exception e, std::uint8_t* out) {
 }  // namespace
 
 Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std::uint8_t* out) {
-  std::uint8_t scratch[256];
+  std::uint8_t scratch[wire::robot_record_bytes];
   while (quantity != 0) {
     const BlockPlace* b = block_at(address);
     if (b == nullptr) return Exception::illegal_data_address;
@@ -168,6 +170,9 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
           std::memcpy(&bits, &v, sizeof bits);
           put32(scratch + 4 * k, bits);
         }
+        break;
+      case Block::robot:
+        device_.robot_record(wire::ByteOrder::big, scratch);
         break;
       case Block::staging_window:
         return Exception::illegal_data_address;
@@ -226,6 +231,7 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t n, const std:
     case Block::reading_window:
     case Block::probe_response:
     case Block::people:
+    case Block::robot:
       break;
   }
   return Exception::illegal_data_address;

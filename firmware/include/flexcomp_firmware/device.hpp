@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 
+#include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
 #include "flexcomp_firmware/config.hpp"
 #include "flexcomp_firmware/control.hpp"
@@ -19,6 +20,8 @@ struct DeviceSettings {
   ControlSettings control{};
   StoreSettings store{};
   std::uint32_t cycle_us = 1000;  ///< period of the control cycle, told to clients
+  /// The robot's name (UTF-8), told to clients; copied. The set's binding is by its hash in the robot. May be null.
+  const char* name = nullptr;
 };
 
 /// One arm. step() belongs to the control cycle's thread or interrupt, everything else to the background's one.
@@ -42,6 +45,9 @@ class Device {
   wire::Capability capability() const;
   wire::Status status() const;
 
+  /// The arm that this controller was built for, into `out` (wire::robot_record_bytes).
+  void robot_record(wire::ByteOrder order, std::uint8_t* out) const;
+
   /// Correction of a joint in the last control cycle; of any joint since the start for joint = 6. deg.
   float correction_deg(std::size_t joint) const;
 
@@ -54,6 +60,8 @@ class Device {
  private:
   const Robot robot_;
   const DeviceSettings settings_;
+  std::array<char, wire::robot_name_bytes> name_{};
+  std::size_t name_size_ = 0;
   ParameterSets sets_{};
   ControlCycle cycle_;
   Store store_;

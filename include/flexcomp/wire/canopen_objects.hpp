@@ -29,6 +29,7 @@
 ///              5  UNSIGNED32      ro      sequence of the active set
 ///              6  UNSIGNED32      ro      detail
 ///              7  UNSIGNED32      ro      control cycles until a trial reverts
+///     0x2003   0  DOMAIN          ro      robot record (robot_record.hpp)
 ///     0x2010   0  UNSIGNED8       const   2
 ///              1  DOMAIN          wo      image into staging
 ///              2  DOMAIN          ro      active image, byte for byte

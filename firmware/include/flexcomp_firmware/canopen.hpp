@@ -1,0 +1,98 @@
+/// \file
+/// CANopen node to CiA 301: NMT slave, boot-up, heartbeat producer and one SDO server (expedited and segmented) with
+/// the object dictionary of canopen_objects.hpp. Frames come and go through callbacks; no I/O in here.
+#ifndef FLEXCOMP_FIRMWARE_CANOPEN_HPP
+#define FLEXCOMP_FIRMWARE_CANOPEN_HPP
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp_firmware/device.hpp"
+
+namespace flexcomp {
+namespace firmware {
+
+/// Sends one data frame with an 11-bit identifier. False where there is no room now: it is offered again at the next
+/// poll(), and a newer answer takes its place.
+struct CanTransmit {
+  void* user = nullptr;
+  bool (*send)(void* user, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) = nullptr;
+};
+
+struct CanopenSettings {
+  std::uint8_t node = 1;                ///< 1 … 127
+  std::uint16_t heartbeat_ms = 1000;    ///< producer heartbeat time after a reset; 0: none
+  std::uint32_t sdo_timeout_ms = 2000;  ///< a transfer on which nothing has come for so long is aborted
+};
+
+class CanopenNode {
+ public:
+  CanopenNode(Device& device, Origin origin, const CanopenSettings& settings, const CanTransmit& transmit);
+  CanopenNode(const CanopenNode&) = delete;
+  CanopenNode& operator=(const CanopenNode&) = delete;
+
+  /// A data frame with an 11-bit identifier (no remote frame) as it came from the bus. Any bytes are survived.
+  void receive(std::uint16_t id, const std::uint8_t* bytes, std::size_t size);
+
+  /// Boot-up message, heartbeat, timeouts and frames that found no room. now_ms wraps.
+  void poll(std::uint32_t now_ms);
+
+  wire::canopen::NmtState state() const { return state_; }
+
+ private:
+  enum class Transfer : std::uint8_t { none, download, upload };
+
+  void nmt(std::uint8_t command);
+  void reset();
+  void request(const std::uint8_t* frame);
+  void begin_download(const std::uint8_t* frame);
+  void download_segment(const std::uint8_t* frame);
+  void begin_upload(const std::uint8_t* frame);
+  void upload_segment(const std::uint8_t* frame);
+  std::uint32_t accept(std::uint32_t size, bool known);
+  std::uint32_t take(const std::uint8_t* bytes, std::uint32_t size);
+  std::uint32_t complete();
+  std::uint32_t set(const std::uint8_t* bytes, std::uint32_t size);
+  std::uint32_t get(std::uint32_t& size);
+  std::uint32_t command(wire::Command command, std::uint32_t argument);
+  bool staging() const;
+  void forget();
+  void abort(std::uint32_t code);
+  void reply(const std::uint8_t* frame);
+  std::uint32_t code_of(wire::Answer a) const;
+
+  Device& device_;
+  const Origin origin_;
+  const CanopenSettings settings_;
+  const CanTransmit transmit_;
+  wire::canopen::NmtState state_ = wire::canopen::NmtState::initialising;
+  bool boot_up_ = true;
+  bool touched_ = false;
+  std::uint32_t touched_ms_ = 0;
+  std::uint32_t heartbeat_ms_ = 0;  ///< when the last one was sent
+  std::uint16_t heartbeat_time_ = 0;
+
+  Transfer transfer_ = Transfer::none;
+  std::uint16_t index_ = 0;
+  std::uint8_t sub_ = 0;
+  bool toggle_ = false;
+  bool size_known_ = false;
+  std::uint32_t size_ = 0;
+  std::uint32_t done_ = 0;
+  std::uint32_t image_crc_ = 0;
+  std::uint32_t argument_ = 0;
+  std::uint16_t command_ = 0;
+
+  bool pending_ = false;
+  std::array<std::uint8_t, 8> out_{};
+  std::array<std::uint8_t, wire::robot_record_bytes> scratch_{};  ///< the longest record
+  std::array<std::uint8_t, wire::probe_request_bytes> probe_request_{};
+  std::array<std::uint8_t, wire::probe_response_bytes> probe_response_{};
+};
+
+}  // namespace firmware
+}  // namespace flexcomp
+
+#endif
