@@ -24,26 +24,27 @@ using Nominal = NominalRobot<joint_count>;
 /// does not use stay at their defaults.
 struct EffectId {
   Effect effect = Effect::joint_compliance;
-  unsigned joint = 0;    ///< from 1
-  unsigned from = 0;     ///< joint_coupling, from 1
-  unsigned link = 0;     ///< link_bending; thermal_growth: 0 means all links
-  double order = 0;      ///< gear_harmonic (may be a fraction), axis_wobble
-  double pivot_z_m = 0;  ///< base_compliance, height in F0
-  double after_s = 0;    ///< reflector_slip
-  std::size_t coefficients = 0;  ///< joint_curve: 6 … 256
-  Factor factor = Factor::one;   ///< joint_curve
-  Place place{};                 ///< unnamed
-  std::array<Covariate, 2> covariate{};          ///< unnamed: along rows, along columns
-  std::array<unsigned, 2> covariate_joint{};     ///< unnamed: from 1 where the covariate is a joint's
-  std::array<std::vector<double>, 2> node{};     ///< unnamed: ascending, SI
+  unsigned joint = 0;                         ///< from 1
+  unsigned from = 0;                          ///< joint_coupling, from 1
+  unsigned link = 0;                          ///< link_bending; thermal_growth: 0 means all links
+  double order = 0;                           ///< gear_harmonic (may be a fraction), axis_wobble
+  double pivot_z_m = 0;                       ///< base_compliance, height in F0
+  double after_s = 0;                         ///< reflector_slip
+  std::size_t coefficients = 0;               ///< joint_curve: 6 … 256
+  Factor factor = Factor::one;                ///< joint_curve
+  Place place{};                              ///< unnamed
+  std::array<Covariate, 2> covariate{};       ///< unnamed: along rows, along columns
+  std::array<unsigned, 2> covariate_joint{};  ///< unnamed: from 1 where the covariate is a joint's
+  std::array<std::vector<double>, 2> node{};  ///< unnamed: ascending, SI
 };
 
 /// What a key of an effect stands for.
 struct EffectKey {
-  std::string key;                  ///< e.g. sin_rad
+  std::string key;  ///< e.g. sin_rad
   Unit unit;
-  std::vector<Term<double>> terms;  ///< with coefficient 0; a curve's or grid's term with coefficient 1 and table 0
-  bool identified = true;           ///< false: accepted from files, but not a parameter on this arm
+  std::vector<Term<double>>
+      terms;               ///< with coefficient 0; a curve's or grid's term with coefficient 1 and table 0
+  bool identified = true;  ///< false: accepted from files, but not a parameter on this arm
 };
 
 /// gear_harmonic; nothing where the name is none of the catalogue's (`geometric` is no effect).
@@ -82,6 +83,11 @@ struct EffectGroup {
 /// \throws std::invalid_argument  a term that fits no key of its effect
 std::vector<EffectGroup> effects_of(const TermSet& set, const Nominal& robot);
 
+/// The set in the order of files: links 1 to 6 (theta, d, a, alpha, beta), base, tool, then the effects in order of
+/// first appearance, each with its keys in the catalogue's order; instances and tables numbered in that order.
+/// \throws std::invalid_argument  as effects_of(), and for two geometric terms at one place
+TermSet canonical(const TermSet& set, const Nominal& robot);
+
 /// Every parameter of a set by name: geometric ones first, then effects_of().
 std::vector<Parameter> parameters_of(const TermSet& set, const Nominal& robot);
 
@@ -92,6 +98,10 @@ std::optional<Place> place_of(std::string_view name);
 Unit place_unit(Place place);
 /// link3.d_mm
 std::string geometric_name(Place place);
+
+/// B and the tool's own terms are small by contract: F and E take what is large.
+constexpr const char* small_terms_rule = "at most 20 mm and 2 deg (larger displacements belong to frames)";
+bool is_beyond_small(const Term<double>& term);
 
 /// q2, dir3, speed1, payload_kg, temp_c, time_s.
 std::string covariate_name(Covariate covariate, unsigned joint);

@@ -29,7 +29,7 @@ struct Frame {
 };
 
 /// T_measured = F B A1 … A6 Tool E.
-struct Frames {
+struct MeasurementFrames {
   Frame f;  ///< Fb in the measurement frame
   Frame e;  ///< the measured point or frame in Ftool
 };
@@ -44,9 +44,10 @@ struct Calibration {
   std::string robot;  ///< name; empty in a truth file that leaves it out
   std::optional<Sha256Digest> nominal_hash;
   TermSet terms;
-  std::vector<double> sigma;        ///< standard deviation per term in SI, NaN where none; may be shorter than terms
-  std::vector<double> value_sigma;  ///< the same per value of the tables
-  std::optional<Frames> frames;     ///< where fitted; the base is then not pushed
+  std::vector<double>
+      sigma;  ///< standard deviation per term in SI, NaN where none; may be shorter than terms
+  std::vector<double> value_sigma;          ///< the same per value of the tables
+  std::optional<MeasurementFrames> frames;  ///< where fitted; the base is then not pushed
   std::vector<Confounded> confounded;
   std::vector<std::pair<std::string, double>> residuals;  ///< by name with unit, e.g. after_mean_mm
   std::string tool_version;

@@ -16,7 +16,8 @@
 namespace flexcomp::host {
 
 struct LoadOptions {
-  bool force = false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong
+  bool force =
+      false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong
 };
 
 enum class MeasurementKind { joints, position, pose, reflectors };  ///< joints: nothing measured
@@ -28,7 +29,8 @@ struct Measurement {
   Context<double, joint_count> context;     ///< with the defaults of the robot file where a column is absent
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< norm 1, w >= 0
-  std::array<Eigen::Vector3d, 4> reflector_m{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+  std::array<Eigen::Vector3d, 4> reflector_m{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                             Eigen::Vector3d::Zero(),
                                              Eigen::Vector3d::Zero()};  ///< A, B, C(, D)
   std::array<double, joint_count> move_rad{};  ///< last motion of each joint, 0 where unknown
   double position_sigma_m = 0;                 ///< per axis of the position, or of each reflector point

@@ -23,8 +23,8 @@ struct ImageOptions {
 /// appearance, so that image -> calibration file -> image is the identity on bytes.
 /// \throws InputError  unnamed effects (unless allowed), base or tool terms above 20 mm or 2 degrees, terms that the
 ///                     core refuses
-std::vector<std::uint8_t> make_image(const Calibration& calibration, const RobotFile& robot, std::uint32_t sequence,
-                                     const ImageOptions& options = {});
+std::vector<std::uint8_t> make_image(const Calibration& calibration, const RobotFile& robot,
+                                     std::uint32_t sequence, const ImageOptions& options = {});
 
 /// Reads an image back into named terms. `source` stands for the file in messages (a file or a bus).
 /// \throws InputError  truncated, altered, for another robot, or with terms that the catalogue cannot name

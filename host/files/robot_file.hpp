@@ -26,10 +26,10 @@ struct Capsule {
 struct RobotFile {
   std::string path;  ///< as it was given, for messages
   std::string name;
-  NominalRobot<joint_count> nominal;         ///< with name_hash of `name`
+  NominalRobot<joint_count> nominal;          ///< with name_hash of `name`
   std::vector<Eigen::Vector3d> reflectors_m;  ///< A, B, C(, D) in Ftool; empty where the file has none
-  bool has_noise = false;                     ///< false: the two figures below are this program's, not the file's
-  double position_sigma_m = 0.035e-3;         ///< standard deviation per axis of a measured point
+  bool has_noise = false;              ///< false: the two figures below are this program's, not the file's
+  double position_sigma_m = 0.035e-3;  ///< standard deviation per axis of a measured point
   double orientation_sigma_rad = 0.007 * 3.14159265358979323846 / 180;  ///< per axis of the rotation vector
   std::array<double, joint_count> max_speed_rad_s{};                    ///< 0 where unknown
   std::array<double, joint_count> gear_ratio{};  ///< motor turns per joint turn, 0 where unknown

@@ -27,8 +27,8 @@ struct Observation {
   /// whitening * [e_p; e_R] has unit covariance; for positions only the upper left 3x3 block is not zero.
   Matrix6d whitening = Matrix6d::Zero();
   std::size_t line = 0;
-  double misfit_chi2 = 0;        ///< of the reflector points to the template
-  std::size_t misfit_dof = 0;    ///< 0: no reflectors
+  double misfit_chi2 = 0;      ///< of the reflector points to the template
+  std::size_t misfit_dof = 0;  ///< 0: no reflectors
 };
 
 /// All rows of a data file as observations. Reflector points are fitted to the robot file's template, else to one that is

@@ -15,8 +15,8 @@ namespace flexcomp::host {
 using Points = std::vector<Eigen::Vector3d>;
 
 struct RigidFit {
-  Pose<double> pose;       ///< points = pose * template, in the least-squares sense
-  double squares_m2 = 0;   ///< sum of squared distances that remain
+  Pose<double> pose;      ///< points = pose * template, in the least-squares sense
+  double squares_m2 = 0;  ///< sum of squared distances that remain
 };
 
 /// Least squares over all points (Arun, Umeyama). Needs three points that are not on one line.
@@ -34,14 +34,15 @@ bool on_one_line(std::span<const Eigen::Vector3d> points_m);
 
 /// Information matrix (inverse covariance) of [position; rotation vector], both in the measurement frame, of a fit whose
 /// points have the standard deviation sigma_m in each coordinate.
-Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose, std::span<const Eigen::Vector3d> template_m,
-                                            double sigma_m);
+Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
+                                            std::span<const Eigen::Vector3d> template_m, double sigma_m);
 
 /// Probability of a chi-square of 3 or 6 degrees of freedom (three or four points) above this value.
 double misfit_probability(double chi2, std::size_t dof);
 
 /// The reflector that most likely moved: 0 … 3 for A … D.
-std::size_t suspect_reflector(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m);
+std::size_t suspect_reflector(std::span<const Eigen::Vector3d> measured_m,
+                              std::span<const Eigen::Vector3d> template_m);
 
 }  // namespace flexcomp::host
 

@@ -1,0 +1,18 @@
+#include "catalogue/host_model.hpp"
+
+#include "files/input_error.hpp"
+#include "flexcomp/status.hpp"
+
+namespace flexcomp::host {
+
+std::unique_ptr<HostModel> prepare(const TermSet& set, const RobotFile& robot, const std::string& source) {
+  auto model = std::make_unique<HostModel>();
+  const Refusal refusal = model->prepare(robot.nominal, set.list());
+  if (refusal != Refusal::none) {
+    throw InputError(source, 0, "", std::string("terms that can be evaluated on ") + robot.path,
+                     text(refusal));
+  }
+  return model;
+}
+
+}  // namespace flexcomp::host

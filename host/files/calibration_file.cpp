@@ -1,0 +1,532 @@
+#include "files/calibration_file.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "catalogue/catalogue.hpp"
+#include "files/nearest.hpp"
+#include "files/quaternion.hpp"
+#include "files/write_file.hpp"
+#include "files/yaml_field.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t link_slot_count = 5;  // gamma has no constant part
+
+// --- reading ------------------------------------------------------------------------------------------------------
+
+/// Builds the terms of a file in its order.
+class Reader {
+ public:
+  Reader(Calibration& calibration, const RobotFile& robot) : out_(calibration), robot_(robot) {}
+
+  void geometric(const YamlField& list) {
+    std::map<unsigned, std::size_t> seen;
+    for (const YamlField& entry : list.items()) {
+      const unsigned link = entry.at("link").integer(1, joint_count);
+      const auto [at, is_new] = seen.emplace(link, entry.line());
+      if (!is_new)
+        throw entry.error("each link once",
+                          fmt::format("link {} again (first in line {})", link, at->second));
+      constants(entry, static_cast<std::uint8_t>(link), link_slot_count, "link");
+    }
+  }
+
+  /// Constant terms of one body under keys such as x_mm, each with its sigma.
+  void constants(const YamlField& entry, std::uint8_t body, std::size_t slots,
+                 const std::string& other_key = "") {
+    std::vector<std::string> names;
+    for (std::uint8_t s = 0; s < slots; ++s) names.push_back(key_of({body, s}));
+    require_keys(entry, names,
+                 other_key.empty() ? std::vector<std::string>{} : std::vector<std::string>{other_key});
+    for (std::uint8_t s = 0; s < slots; ++s) {
+      const auto field = entry.find(names[s]);
+      if (!field) continue;
+      Term<double> t;
+      t.place = {body, s};
+      t.coefficient = field->number(place_unit(t.place));
+      if (is_beyond_small(t)) throw field->error(small_terms_rule);
+      add(t, sigma(entry, names[s], place_unit(t.place)));
+    }
+  }
+
+  void effect(const YamlField& entry) {
+    const YamlField name_field = entry.at("effect");
+    const std::string effect_text = name_field.text();
+    const auto effect = effect_of(effect_text);
+    if (!effect) {
+      const std::string near = nearest(effect_text, effect_names());
+      throw name_field.error(near.empty()
+                                 ? fmt::format("one of {}", fmt::join(effect_names(), ", "))
+                                 : fmt::format("an effect of the catalogue (did you mean '{}'?)", near));
+    }
+    std::vector<std::string> selectors{"effect"};
+    const EffectId id = identity(entry, *effect, selectors);
+    if (const auto wrong = fault(id, robot_.nominal)) throw entry.error(*wrong, name(id));
+    const auto [at, is_new] = seen_.emplace(name(id), entry.line());
+    if (!is_new)
+      throw entry.error("each effect once", fmt::format("{} again (first in line {})", name(id), at->second));
+
+    const std::vector<EffectKey> list = keys(id, robot_.nominal);
+    std::vector<std::string> names;
+    for (const EffectKey& key : list) names.push_back(key.key);
+    require_keys(entry, names, selectors);
+    const std::uint16_t instance = next_instance(out_.terms);
+    for (const EffectKey& key : list) {
+      const auto field = entry.find(key.key);
+      if (!field) continue;
+      if (key.terms.front().table != no_table) {
+        table(entry, *field, id, key, instance);
+        continue;
+      }
+      const double value = field->number(key.unit);
+      for (Term<double> t : key.terms) {
+        t.coefficient = value;
+        t.instance = instance;
+        add(t, sigma(entry, key.key, key.unit));
+      }
+    }
+  }
+
+ private:
+  static std::string key_of(Place place) {
+    const std::string full = geometric_name(place);
+    return full.substr(full.find('.') + 1);
+  }
+
+  static void require_keys(const YamlField& entry, const std::vector<std::string>& coefficients,
+                           const std::vector<std::string>& others) {
+    std::vector<std::string> known = others;
+    known.insert(known.end(), coefficients.begin(), coefficients.end());
+    // Uncertainties stand beside their coefficients only; among the hints they would hide the keys that matter.
+    std::vector<std::string> all = known;
+    for (const std::string& c : coefficients) {
+      const auto sigma = entry.find("sigma_" + c);
+      if (!sigma) continue;
+      if (!entry.has(c)) throw sigma->error(fmt::format("it beside {}", c), "it alone");
+      all.push_back("sigma_" + c);
+    }
+    entry.require_keys(all);
+  }
+
+  static double sigma(const YamlField& entry, const std::string& key, const Unit& unit) {
+    const auto field = entry.find("sigma_" + key);
+    if (!field) return none;
+    const double value = field->number(unit);
+    if (value < 0) throw field->error("a standard deviation of 0 or more");
+    return value;
+  }
+
+  void add(const Term<double>& term, double sigma) {
+    out_.terms.terms.push_back(term);
+    out_.sigma.push_back(sigma);
+  }
+
+  /// The selectors of an effect: what stands in the brackets of its name. Their keys are appended to `selectors`.
+  static EffectId identity(const YamlField& entry, Effect effect, std::vector<std::string>& selectors) {
+    EffectId id;
+    id.effect = effect;
+    const auto joint = [&](const char* key) {
+      selectors.emplace_back(key);
+      return entry.at(key).integer(1, joint_count);
+    };
+    switch (effect) {
+      case Effect::joint_compliance:
+      case Effect::nonlinear_compliance:
+      case Effect::backlash:
+      case Effect::readout_lag:
+      case Effect::encoder_scale:
+        id.joint = joint("joint");
+        break;
+      case Effect::gear_harmonic:
+      case Effect::axis_wobble:
+        id.joint = joint("joint");
+        selectors.emplace_back("order");
+        id.order = entry.at("order").number(unit::si, 0, "an order above 0");
+        break;
+      case Effect::joint_coupling:
+        id.joint = joint("joint");
+        id.from = joint("from");
+        break;
+      case Effect::joint_curve:
+        id.joint = joint("joint");
+        selectors.emplace_back("factor");
+        id.coefficients = entry.at("coefficients_rad").items().size();
+        if (const auto field = entry.find("factor")) id.factor = factor(*field);
+        break;
+      case Effect::link_bending:
+        id.link = joint("link");
+        break;
+      case Effect::thermal_growth:
+        selectors.emplace_back("link");
+        if (entry.has("link")) id.link = entry.at("link").integer(1, joint_count);
+        break;
+      case Effect::base_compliance:
+        selectors.emplace_back("pivot_z_mm");
+        id.pivot_z_m = entry.number_or("pivot_z_mm", unit::mm, 0);
+        break;
+      case Effect::reflector_slip:
+        selectors.emplace_back("after_s");
+        id.after_s = entry.at("after_s").number(unit::si);
+        break;
+      case Effect::unnamed:
+        selectors.insert(selectors.end(), {"place", "of", "grid"});
+        unnamed(entry, id);
+        break;
+      default:
+        break;
+    }
+    return id;
+  }
+
+  static Factor factor(const YamlField& field) {
+    const std::string text = field.text();
+    for (const auto& [f, factor_text] : factor_names) {
+      if (text == factor_text) return f;
+    }
+    throw field.error("one of load_torque, temperature, payload");
+  }
+
+  static void unnamed(const YamlField& entry, EffectId& id) {
+    const YamlField place_field = entry.at("place");
+    const auto place = place_of(place_field.text());
+    if (!place) throw place_field.error("a place such as link3.theta");
+    id.place = *place;
+    const YamlField of = entry.at("of");
+    const YamlField grid = entry.at("grid");
+    const auto names = of.items();
+    const auto sides = grid.items();
+    if (names.size() != 2) throw of.error("two covariates such as [q2, payload_kg]");
+    if (sides.size() != 2) throw grid.error("two lists of nodes");
+    for (std::size_t side = 0; side < 2; ++side) {
+      const auto covariate = covariate_of(names[side].text());
+      if (!covariate)
+        throw names[side].error("one of q1 … q6, payload_kg, temp_c, time_s, dir1 … dir6, speed1 … speed6");
+      std::tie(id.covariate[side], id.covariate_joint[side]) = *covariate;
+      for (const YamlField& node : sides[side].items())
+        id.node[side].push_back(node.number(covariate_unit(covariate->first)));
+    }
+  }
+
+  /// Numbers of a curve (a list) or a grid (a list of rows).
+  static std::vector<double> numbers(const YamlField& field, const EffectId& id, const Unit& unit) {
+    std::vector<double> values;
+    if (id.effect == Effect::joint_curve) {
+      for (const YamlField& item : field.items()) values.push_back(item.number(unit));
+      if (values.size() != id.coefficients) throw field.error(fmt::format("{} numbers", id.coefficients));
+      return values;
+    }
+    const auto rows = field.items();
+    if (rows.size() != id.node[0].size()) {
+      throw field.error(fmt::format("{} rows, one per node of the first side", id.node[0].size()));
+    }
+    for (const YamlField& row : rows) {
+      const auto items = row.items();
+      if (items.size() != id.node[1].size()) {
+        throw row.error(fmt::format("{} values, one per node of the second side", id.node[1].size()));
+      }
+      for (const YamlField& item : items) values.push_back(item.number(unit));
+    }
+    return values;
+  }
+
+  void table(const YamlField& entry, const YamlField& field, const EffectId& id, const EffectKey& key,
+             std::uint16_t instance) {
+    const std::vector<double> values = numbers(field, id, key.unit);
+    const std::size_t first_term = out_.terms.terms.size();
+    ParametricModel one;
+    one.set = std::move(out_.terms);
+    try {
+      add_effect(one, id, robot_.nominal);
+    } catch (const std::invalid_argument& e) {
+      throw field.error("less", e.what());
+    }
+    for (std::size_t k = 0; k < values.size(); ++k) one.parameters[k].set(one.set, values[k]);
+    out_.terms = std::move(one.set);
+    out_.terms.terms[first_term].instance = instance;
+    out_.sigma.push_back(none);
+    if (const auto sigmas = entry.find("sigma_" + key.key)) {
+      const std::vector<double> list = numbers(*sigmas, id, key.unit);
+      out_.value_sigma.resize(out_.terms.values.size() - list.size(), none);
+      out_.value_sigma.insert(out_.value_sigma.end(), list.begin(), list.end());
+    }
+    out_.value_sigma.resize(out_.terms.values.size(), none);
+  }
+
+ public:
+  static const std::vector<std::pair<Factor, std::string>> factor_names;
+
+ private:
+  Calibration& out_;
+  const RobotFile& robot_;
+  std::map<std::string, std::size_t> seen_;
+};
+
+const std::vector<std::pair<Factor, std::string>> Reader::factor_names{
+    {Factor::load_torque, "load_torque"}, {Factor::temperature, "temperature"}, {Factor::payload, "payload"}};
+
+Frame read_frame(const YamlField& field) {
+  field.require_keys({"xyz_mm", "quaternion_wxyz"});
+  Frame frame;
+  frame.position_m = field.at("xyz_mm").vector3(unit::mm);
+  if (const auto q = field.find("quaternion_wxyz")) frame.orientation = q->quaternion();
+  return frame;
+}
+
+Sha256Digest read_hash(const YamlField& field) {
+  const std::string text = field.text();
+  Sha256Digest digest{};
+  bool good = text.size() == 2 * digest.size();
+  for (std::size_t k = 0; good && k < digest.size(); ++k) {
+    const char* p = text.data() + 2 * k;
+    const auto [end, error] = std::from_chars(p, p + 2, digest[k], 16);
+    good = error == std::errc() && end == p + 2;
+  }
+  if (!good) throw field.error("64 hexadecimal digits");
+  return digest;
+}
+
+void read_head(const YamlField& root, const RobotFile& robot, Calibration& c) {
+  if (const auto field = root.find("robot")) {
+    c.robot = field->text();
+    if (c.robot != robot.name)
+      throw field->error(fmt::format("'{}', the robot of {}", robot.name, robot.path));
+  }
+  if (const auto field = root.find("nominal_hash")) {
+    c.nominal_hash = read_hash(*field);
+    if (*c.nominal_hash != nominal_hash(robot.nominal)) {
+      throw field->error(fmt::format("the nominal geometry of {} ({}…)", robot.path,
+                                     hex(nominal_hash(robot.nominal)).substr(0, 12)),
+                         hex(*c.nominal_hash).substr(0, 12) + "…: made for another geometry");
+    }
+  }
+  if (const auto field = root.find("flexcomp_version")) c.tool_version = field->text();
+  if (const auto field = root.find("date")) c.date = field->text();
+  if (const auto field = root.find("sequence"))
+    c.sequence = field->integer(0, std::numeric_limits<std::uint32_t>::max());
+  if (const auto field = root.find("frames")) {
+    field->require_keys({"f", "e"});
+    c.frames.emplace();
+    if (const auto f = field->find("f")) c.frames->f = read_frame(*f);
+    if (const auto e = field->find("e")) c.frames->e = read_frame(*e);
+  }
+  if (const auto field = root.find("confounded")) {
+    for (const YamlField& entry : field->items()) {
+      entry.require_keys({"parameter", "with"});
+      Confounded confounded;
+      confounded.parameter = entry.at("parameter").text();
+      for (const YamlField& other : entry.at("with").items()) confounded.with.push_back(other.text());
+      c.confounded.push_back(std::move(confounded));
+    }
+  }
+  if (const auto field = root.find("residuals")) {
+    for (const std::string& key : field->keys())
+      c.residuals.emplace_back(key, field->at(key).number(unit::si));
+  }
+}
+
+// --- writing ------------------------------------------------------------------------------------------------------
+
+/// A number as YAML 1.1 readers also take it for one: 1e-05 is text to them, 1.0e-05 is not.
+std::string yaml_number(std::string text) {
+  const std::size_t e = text.find('e');
+  if (e != std::string::npos && text.find('.') == std::string::npos) text.insert(e, ".0");
+  return text;
+}
+
+std::string number(double si, const Unit& unit) { return yaml_number(format_si(si, unit)); }
+
+/// Uncertainties are known to few digits.
+std::string sigma_number(double si, const Unit& unit) {
+  return yaml_number(fmt::format("{:.6g}", si / unit.si_per_file_unit()));
+}
+
+std::string quoted(const std::string& text) {
+  YAML::Emitter emitter;
+  emitter << YAML::DoubleQuoted << text;
+  return emitter.c_str();
+}
+
+std::string frame_text(const Frame& f) {
+  const auto p = [&](int k) { return number(f.position_m[k], unit::mm); };
+  const Eigen::Quaterniond& q = f.orientation;
+  return fmt::format("{{xyz_mm: [{}, {}, {}], quaternion_wxyz: [{}, {}, {}, {}]}}", p(0), p(1), p(2),
+                     number(q.w(), unit::si), number(q.x(), unit::si), number(q.y(), unit::si),
+                     number(q.z(), unit::si));
+}
+
+double sigma_at(const std::vector<double>& sigma, std::size_t k) {
+  return k < sigma.size() ? sigma[k] : none;
+}
+
+/// `key: value` with its sigma where there is one.
+void put(std::vector<std::string>& parts, const std::string& key, double si, double sigma, const Unit& unit) {
+  parts.push_back(fmt::format("{}: {}", key, number(si, unit)));
+  if (!std::isnan(sigma)) parts.push_back(fmt::format("sigma_{}: {}", key, sigma_number(sigma, unit)));
+}
+
+/// Geometric terms of one body, in the order of their slots.
+std::vector<std::string> constants_text(const Calibration& c, std::uint8_t body) {
+  std::vector<std::string> parts;
+  for (std::uint8_t s = 0; s < 6; ++s) {
+    for (std::size_t k = 0; k < c.terms.terms.size(); ++k) {
+      const Term<double>& t = c.terms.terms[k];
+      if (t.effect != Effect::geometric || t.place != Place{body, s}) continue;
+      const std::string full = geometric_name(t.place);
+      put(parts, full.substr(full.find('.') + 1), t.coefficient, sigma_at(c.sigma, k), place_unit(t.place));
+    }
+  }
+  return parts;
+}
+
+std::string list_text(const std::vector<std::string>& items) {
+  return fmt::format("[{}]", fmt::join(items, ", "));
+}
+
+/// Numbers of a curve as a list, of a grid as a list of rows.
+std::string values_text(const EffectId& id, const std::vector<std::string>& values) {
+  if (id.effect == Effect::joint_curve) return list_text(values);
+  const auto columns = static_cast<std::ptrdiff_t>(id.node[1].size());
+  std::vector<std::string> rows;
+  for (auto at = values.begin(); at != values.end(); at += columns)
+    rows.push_back(list_text({at, at + columns}));
+  return list_text(rows);
+}
+
+std::vector<std::string> selectors_text(const EffectId& id) {
+  std::vector<std::string> parts{"effect: " + effect_name(id.effect)};
+  if (id.joint != 0) parts.push_back(fmt::format("joint: {}", id.joint));
+  if (id.from != 0) parts.push_back(fmt::format("from: {}", id.from));
+  if (id.link != 0) parts.push_back(fmt::format("link: {}", id.link));
+  if (id.order != 0) parts.push_back("order: " + number(id.order, unit::si));
+  if (id.effect == Effect::base_compliance) parts.push_back("pivot_z_mm: " + number(id.pivot_z_m, unit::mm));
+  if (id.effect == Effect::reflector_slip) parts.push_back("after_s: " + number(id.after_s, unit::si));
+  for (const auto& [factor, factor_text] : Reader::factor_names) {
+    if (id.effect == Effect::joint_curve && id.factor == factor) parts.push_back("factor: " + factor_text);
+  }
+  if (id.effect == Effect::unnamed) {
+    std::vector<std::string> names;
+    std::vector<std::string> sides;
+    for (std::size_t side = 0; side < 2; ++side) {
+      names.push_back(covariate_name(id.covariate[side], id.covariate_joint[side]));
+      std::vector<std::string> nodes;
+      for (const double v : id.node[side]) nodes.push_back(number(v, covariate_unit(id.covariate[side])));
+      sides.push_back(list_text(nodes));
+    }
+    parts.push_back("place: " + place_name(id.place));
+    parts.push_back("of: " + list_text(names));
+    parts.push_back("grid: " + list_text(sides));
+  }
+  return parts;
+}
+
+std::string effect_text(const Calibration& c, const EffectGroup& group) {
+  std::vector<std::string> parts = selectors_text(group.id);
+  if (group.id.effect == Effect::joint_curve || group.id.effect == Effect::unnamed) {
+    std::vector<std::string> values;
+    std::vector<std::string> sigmas;
+    bool any_sigma = false;
+    for (const Parameter& p : group.parameters) {
+      const double sigma = sigma_at(c.value_sigma, *p.value);
+      any_sigma = any_sigma || !std::isnan(sigma);
+      values.push_back(number(p.get(c.terms), p.unit));
+      sigmas.push_back(sigma_number(std::isnan(sigma) ? 0 : sigma, p.unit));
+    }
+    parts.push_back(group.keys.front() + ": " + values_text(group.id, values));
+    if (any_sigma) parts.push_back("sigma_" + group.keys.front() + ": " + values_text(group.id, sigmas));
+  } else {
+    for (std::size_t k = 0; k < group.parameters.size(); ++k) {
+      const Parameter& p = group.parameters[k];
+      put(parts, group.keys[k], p.get(c.terms), sigma_at(c.sigma, p.terms.front()), p.unit);
+    }
+  }
+  return fmt::format("  - {{{}}}\n", fmt::join(parts, ", "));
+}
+
+}  // namespace
+
+Frame Frame::of(const Pose<double>& pose) { return {pose.position, unit_quaternion(pose.rotation)}; }
+
+std::string hex(const Sha256Digest& digest) {
+  std::string text;
+  for (const std::uint8_t byte : digest) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
+void stamp(Calibration& calibration, const RobotFile& robot) {
+  calibration.robot = robot.name;
+  calibration.nominal_hash = nominal_hash(robot.nominal);
+  calibration.tool_version = FLEXCOMP_VERSION;
+  calibration.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+Calibration load_calibration(const std::string& path, const RobotFile& robot) {
+  const YamlField root = YamlField::load(path);
+  root.require_keys({"robot", "nominal_hash", "flexcomp_version", "date", "sequence", "frames", "geometric",
+                     "base", "tool", "effects", "confounded", "residuals"});
+  Calibration calibration;
+  calibration.path = path;
+  read_head(root, robot, calibration);
+  Reader reader(calibration, robot);
+  if (const auto field = root.find("geometric")) reader.geometric(*field);
+  if (const auto field = root.find("base")) reader.constants(*field, body::base, 6);
+  if (const auto field = root.find("tool")) reader.constants(*field, body::tool, 6);
+  if (const auto field = root.find("effects")) {
+    for (const YamlField& entry : field->items()) reader.effect(entry);
+  }
+  return calibration;
+}
+
+std::string calibration_text(const Calibration& c, const RobotFile& robot) {
+  canonical(c.terms, robot.nominal);  // throws where a term would be lost below
+  std::string text = "# Differences from the nominal robot, each with its standard deviation (sigma_…).\n";
+  text += "robot: " + quoted(robot.name) + "\n";
+  if (c.nominal_hash) text += "nominal_hash: " + quoted(hex(*c.nominal_hash)) + "\n";
+  if (!c.tool_version.empty()) text += "flexcomp_version: " + quoted(c.tool_version) + "\n";
+  if (!c.date.empty()) text += "date: " + quoted(c.date) + "\n";
+  if (c.sequence) text += fmt::format("sequence: {}\n", *c.sequence);
+  if (c.frames) {
+    text += "frames:  # measured = f * base … tool * e\n";
+    text += "  f: " + frame_text(c.frames->f) + "\n  e: " + frame_text(c.frames->e) + "\n";
+  }
+  std::string links;
+  for (std::uint8_t link = 1; link <= joint_count; ++link) {
+    const std::vector<std::string> parts = constants_text(c, link);
+    if (!parts.empty()) links += fmt::format("  - {{link: {}, {}}}\n", link, fmt::join(parts, ", "));
+  }
+  if (!links.empty()) text += "geometric:\n" + links;
+  if (const auto parts = constants_text(c, body::base); !parts.empty())
+    text += fmt::format("base: {{{}}}\n", fmt::join(parts, ", "));
+  if (const auto parts = constants_text(c, body::tool); !parts.empty())
+    text += fmt::format("tool: {{{}}}\n", fmt::join(parts, ", "));
+  const std::vector<EffectGroup> groups = effects_of(c.terms, robot.nominal);
+  if (!groups.empty()) text += "effects:\n";
+  for (const EffectGroup& group : groups) text += effect_text(c, group);
+  if (!c.confounded.empty()) text += "confounded:  # left out, and what carries it\n";
+  for (const Confounded& confounded : c.confounded) {
+    std::vector<std::string> with;
+    for (const std::string& other : confounded.with) with.push_back(quoted(other));
+    text += fmt::format("  - {{parameter: {}, with: {}}}\n", quoted(confounded.parameter), list_text(with));
+  }
+  if (!c.residuals.empty()) text += "residuals:\n";
+  for (const auto& [key, value] : c.residuals)
+    text += fmt::format("  {}: {}\n", key, number(value, unit::si));
+  return text;
+}
+
+void save_calibration(const std::string& path, const Calibration& calibration, const RobotFile& robot) {
+  write_file(path, calibration_text(calibration, robot));
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,503 @@
+#include "files/data_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <unordered_map>
+
+#include "files/csv.hpp"
+#include "files/input_error.hpp"
+#include "files/nearest.hpp"
+#include "files/quaternion.hpp"
+#include "files/write_file.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+using Column = std::optional<std::size_t>;
+constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
+constexpr std::array<const char*, 4> quaternion_names{"qw", "qx", "qy", "qz"};
+constexpr std::array<const char*, 4> reflector_names{"a", "b", "c", "d"};
+
+// A reading that was written with few digits may lie beyond a limit by that rounding, not more.
+constexpr double limit_tolerance_rad = 1e-9;
+// Below 7 every reading could be radians: two turns and a bit.
+constexpr double suspicious_below = 7;
+constexpr std::size_t suspicious_rows = 3;
+
+std::string joint_name(std::size_t j) { return fmt::format("q{}_deg", j + 1); }
+std::string seed_name(std::size_t j) { return fmt::format("seed{}_deg", j + 1); }
+std::string move_name(std::size_t j) { return fmt::format("move{}_deg", j + 1); }
+std::string direction_name(std::size_t j) { return fmt::format("dir{}", j + 1); }
+std::string position_name(std::size_t k) { return fmt::format("{}_mm", axis_names[k]); }
+std::string com_name(std::size_t k) { return fmt::format("payload_{}_mm", axis_names[k]); }
+std::string force_name(std::size_t k) { return fmt::format("f{}_n", axis_names[k]); }
+std::string point_name(std::size_t r, std::size_t k) {
+  return fmt::format("{}{}_mm", reflector_names[r], axis_names[k]);
+}
+
+/// Every name that has a meaning in data files and targets, for hints.
+std::vector<std::string> known_names() {
+  std::vector<std::string> names;
+  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(joint_name(j));
+  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(seed_name(j));
+  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(move_name(j));
+  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(direction_name(j));
+  for (std::size_t k = 0; k < 3; ++k) {
+    names.push_back(position_name(k));
+    names.push_back(com_name(k));
+    names.push_back(force_name(k));
+    for (std::size_t r = 0; r < 4; ++r) names.push_back(point_name(r, k));
+  }
+  names.insert(names.end(), quaternion_names.begin(), quaternion_names.end());
+  names.insert(names.end(), {"payload_kg", "temp_c", "time_s", "sigma_mm", "sigma_deg"});
+  return names;
+}
+
+/// Reads the columns that data files and targets have in common, and remembers which ones it used.
+class ColumnReader {
+ public:
+  ColumnReader(CsvTable table, const RobotFile& robot)
+      : table_(std::move(table)), robot_(robot), used_(table_.header.size()) {
+    payload_ = use("payload_kg");
+    temperature_ = use("temp_c");
+    time_ = use("time_s");
+    position_sigma_ = use("sigma_mm");
+    orientation_sigma_ = use("sigma_deg");
+    for (std::size_t k = 0; k < 3; ++k) {
+      com_[k] = use(com_name(k));
+      force_[k] = use(force_name(k));
+    }
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      move_[j] = use(move_name(j));
+      direction_[j] = use(direction_name(j));
+    }
+  }
+
+  const CsvTable& table() const { return table_; }
+  bool has(const std::string& name) const { return table_.has(name); }
+
+  Column use(const std::string& name) {
+    const Column column = table_.find(name);
+    if (column) used_[*column] = true;
+    return column;
+  }
+  std::size_t require(const std::string& name, std::string_view purpose) {
+    const std::size_t column = table_.require(name, purpose);
+    used_[column] = true;
+    return column;
+  }
+  std::array<std::size_t, joint_count> require_joints(std::string (*name)(std::size_t),
+                                                      std::string_view purpose) {
+    std::array<std::size_t, joint_count> columns{};
+    for (std::size_t j = 0; j < joint_count; ++j) columns[j] = require(name(j), purpose);
+    return columns;
+  }
+
+  double number(const CsvRow& row, std::size_t column, const Unit& unit) const {
+    return table_.number(row, column, unit);
+  }
+  InputError error(const CsvRow& row, std::size_t column, const std::string& expected,
+                   const std::string& note = "") const {
+    return {table_.path, row.line, table_.header[column], expected, "'" + row.cells[column] + "'" + note};
+  }
+
+  ContextColumns columns() const {
+    ContextColumns c;
+    c.payload_mass = payload_.has_value();
+    c.temperature = temperature_.has_value();
+    c.time = time_.has_value();
+    c.position_sigma = position_sigma_.has_value();
+    c.orientation_sigma = orientation_sigma_.has_value();
+    for (std::size_t k = 0; k < 3; ++k) {
+      c.payload_com[k] = com_[k].has_value();
+      c.force[k] = force_[k].has_value();
+    }
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      c.move[j] = move_[j].has_value();
+      c.direction[j] = direction_[j].has_value();
+    }
+    return c;
+  }
+
+  /// Context, motion and sigma of a row.
+  void read_context(const CsvRow& row, Measurement& m) const {
+    m.context = default_context<double>(robot_.nominal);
+    m.position_sigma_m = robot_.position_sigma_m;
+    m.orientation_sigma_rad = robot_.orientation_sigma_rad;
+    if (payload_) {
+      m.context.payload_kg = number(row, *payload_, unit::si);
+      if (m.context.payload_kg < 0) throw error(row, *payload_, "a mass of 0 or more");
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (com_[k]) m.context.payload_com_m[k] = number(row, *com_[k], unit::mm);
+      if (force_[k]) m.context.force_n[k] = number(row, *force_[k], unit::si);
+    }
+    if (temperature_) m.context.temperature_c = number(row, *temperature_, unit::si);
+    if (time_) m.context.time_s = number(row, *time_, unit::si);
+    if (position_sigma_) m.position_sigma_m = positive(row, *position_sigma_, unit::mm);
+    if (orientation_sigma_) m.orientation_sigma_rad = positive(row, *orientation_sigma_, unit::degree);
+    read_motion(row, m);
+  }
+
+  void read_joints(const CsvRow& row, const std::array<std::size_t, joint_count>& columns,
+                   std::array<double, joint_count>& q_rad, bool within_limits) const {
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      q_rad[j] = number(row, columns[j], unit::degree);
+      const JointLimits& limits = robot_.nominal.limits[j];
+      if (within_limits && (q_rad[j] < limits.min_rad - limit_tolerance_rad ||
+                            q_rad[j] > limits.max_rad + limit_tolerance_rad)) {
+        throw error(row, columns[j],
+                    fmt::format("a reading within the limits of joint {} in {} ({:.6g} to {:.6g} deg)", j + 1,
+                                robot_.path, degrees(limits.min_rad), degrees(limits.max_rad)));
+      }
+    }
+  }
+
+  Eigen::Quaterniond read_quaternion(const CsvRow& row, const std::array<std::size_t, 4>& columns) const {
+    std::array<double, 4> wxyz{};
+    for (std::size_t k = 0; k < 4; ++k) wxyz[k] = number(row, columns[k], unit::si);
+    if (const auto q = unit_quaternion(wxyz)) return *q;
+    throw InputError(
+        table_.path, row.line, "qw qx qy qz", "a quaternion of norm 1 (within 0.001)",
+        fmt::format("norm {:.6g}", Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm()));
+  }
+
+  /// Radians under names that say degrees move an arm by a few degrees only.
+  void suspect_radians(const std::array<std::size_t, joint_count>& columns,
+                       const LoadOptions& options) const {
+    if (options.force || table_.rows.size() < suspicious_rows) return;
+    double largest = 0;
+    for (const CsvRow& row : table_.rows) {
+      for (const std::size_t c : columns) largest = std::max(largest, std::abs(number(row, c, unit::si)));
+    }
+    if (largest > suspicious_below) return;
+    throw InputError(
+        table_.path, 0, "q1_deg … q6_deg", "degrees",
+        fmt::format(
+            "no reading above {:.3g} in {} rows: these look like radians (--force takes them as degrees)",
+            largest, table_.rows.size()));
+  }
+
+  /// Columns that nobody used, with a warning.
+  std::vector<std::size_t> unused(std::vector<std::string>& names, std::vector<std::string>& warnings) const {
+    static const std::vector<std::string> known = known_names();
+    std::vector<std::size_t> columns;
+    for (std::size_t k = 0; k < used_.size(); ++k) {
+      if (used_[k]) continue;
+      const std::string& name = table_.header[k];
+      const std::string near = nearest(name, known);
+      columns.push_back(k);
+      names.push_back(name);
+      const bool is_known = near == name;
+      warnings.push_back(
+          fmt::format("{}: column '{}' {}{}.", table_.path, name,
+                      is_known ? "is not used here" : "has no meaning here and is passed through",
+                      near.empty() || is_known ? "" : fmt::format(" (did you mean '{}'?)", near)));
+    }
+    return columns;
+  }
+
+ private:
+  double positive(const CsvRow& row, std::size_t column, const Unit& unit) const {
+    const double value = number(row, column, unit);
+    if (!(value > 0)) throw error(row, column, "a standard deviation above 0");
+    return value;
+  }
+
+  void read_motion(const CsvRow& row, Measurement& m) const {
+    double largest = 0;
+    bool all = true;
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      if (direction_[j]) {
+        const double d = number(row, *direction_[j], unit::si);
+        if (d != -1 && d != 0 && d != 1) throw error(row, *direction_[j], "-1, 0 (unknown) or 1");
+        m.context.direction[j] = d;
+      }
+      all = all && move_[j];
+      if (!move_[j]) continue;
+      m.move_rad[j] = number(row, *move_[j], unit::degree);
+      const double sign = m.move_rad[j] > 0 ? 1 : m.move_rad[j] < 0 ? -1 : 0;
+      if (direction_[j] && m.context.direction[j] != 0 && m.context.direction[j] != sign) {
+        throw error(row, *direction_[j],
+                    fmt::format("the sign of {} ({})", move_name(j), row.cells[*move_[j]]));
+      }
+      m.context.direction[j] = sign;
+      largest = std::max(largest, std::abs(m.move_rad[j]));
+    }
+    // The speed relative to the fastest joint is known only where every joint's motion is.
+    if (!all || largest == 0) return;
+    for (std::size_t j = 0; j < joint_count; ++j) m.context.relative_speed[j] = m.move_rad[j] / largest;
+  }
+
+  CsvTable table_;
+  const RobotFile& robot_;
+  std::vector<bool> used_;
+  Column payload_, temperature_, time_, position_sigma_, orientation_sigma_;
+  std::array<Column, 3> com_, force_;
+  std::array<Column, joint_count> move_, direction_;
+};
+
+/// What was measured, by the columns that are there.
+struct MeasuredColumns {
+  MeasurementKind kind = MeasurementKind::joints;
+  std::array<std::size_t, 3> position{};
+  std::array<std::size_t, 4> quaternion{};
+  std::array<std::array<std::size_t, 3>, 4> point{};
+  std::size_t reflectors = 0;
+};
+
+MeasuredColumns find_measured(ColumnReader& reader, bool required) {
+  MeasuredColumns m;
+  bool any_position = false;
+  bool any_quaternion = false;
+  std::array<bool, 4> any_point{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    any_position = any_position || reader.has(position_name(k));
+    for (std::size_t r = 0; r < 4; ++r) any_point[r] = any_point[r] || reader.has(point_name(r, k));
+  }
+  for (const char* name : quaternion_names) any_quaternion = any_quaternion || reader.has(name);
+  const bool any_reflector = any_point[0] || any_point[1] || any_point[2] || any_point[3];
+  const char* const choice =
+      "what was measured: x_mm y_mm z_mm with or without qw qx qy qz, or reflectors ax_mm … cz_mm (dz_mm)";
+  if ((any_position || any_quaternion) && any_reflector) {
+    throw InputError(reader.table().path, 1, "", choice, "both a position and reflectors");
+  }
+  if (any_position || any_quaternion) {
+    for (std::size_t k = 0; k < 3; ++k) m.position[k] = reader.require(position_name(k), choice);
+    m.kind = MeasurementKind::position;
+  }
+  if (any_quaternion) {
+    for (std::size_t k = 0; k < 4; ++k) m.quaternion[k] = reader.require(quaternion_names[k], choice);
+    m.kind = MeasurementKind::pose;
+  }
+  if (any_reflector) {
+    m.reflectors = any_point[3] ? 4 : 3;
+    for (std::size_t r = 0; r < m.reflectors; ++r) {
+      for (std::size_t k = 0; k < 3; ++k) m.point[r][k] = reader.require(point_name(r, k), choice);
+    }
+    m.kind = MeasurementKind::reflectors;
+  }
+  if (required && m.kind == MeasurementKind::joints) reader.require("x_mm", choice);
+  return m;
+}
+
+void read_measured(const ColumnReader& reader, const CsvRow& row, const MeasuredColumns& columns,
+                   Measurement& m) {
+  if (columns.kind == MeasurementKind::position || columns.kind == MeasurementKind::pose) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      m.position_m[static_cast<Eigen::Index>(k)] = reader.number(row, columns.position[k], unit::mm);
+    }
+  }
+  if (columns.kind == MeasurementKind::pose) m.orientation = reader.read_quaternion(row, columns.quaternion);
+  for (std::size_t r = 0; r < columns.reflectors; ++r) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      m.reflector_m[r][static_cast<Eigen::Index>(k)] = reader.number(row, columns.point[r][k], unit::mm);
+    }
+  }
+}
+
+/// Refuses a row that repeats another one in all its values. A pose measured twice differs at least in its noise; the
+/// same row twice is a copying error that would count as independent evidence.
+void refuse_repeats(const CsvTable& table) {
+  std::unordered_map<std::string, std::size_t> seen;
+  for (const CsvRow& row : table.rows) {
+    std::string key;
+    for (const std::string& cell : row.cells) {
+      // By value: 1.0 and 1 are the same number.
+      const auto value = parse_si(cell, unit::si);
+      key += value ? fmt::format("{},", *value) : "\"" + cell + "\",";
+    }
+    const auto [at, is_new] = seen.emplace(std::move(key), row.line);
+    if (!is_new) {
+      throw InputError(table.path, row.line, "", "another row (a pose measured again differs in its noise)",
+                       fmt::format("every value of line {} again", at->second));
+    }
+  }
+}
+
+DataFile load(const std::string& path, const RobotFile& robot, const LoadOptions& options, bool measured) {
+  ColumnReader reader(read_csv(path), robot);
+  DataFile data;
+  data.path = path;
+  const auto joints = reader.require_joints(joint_name, "joint readings q1_deg … q6_deg");
+  const MeasuredColumns columns = find_measured(reader, measured);
+  data.kind = columns.kind;
+  data.reflectors = columns.reflectors;
+  data.columns = reader.columns();
+  const std::vector<std::size_t> extra = reader.unused(data.extra, data.warnings);
+  const CsvTable& table = reader.table();
+  if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
+  reader.suspect_radians(joints, options);
+  for (const CsvRow& row : table.rows) {
+    Measurement m;
+    m.line = row.line;
+    reader.read_joints(row, joints, m.q_rad, true);
+    reader.read_context(row, m);
+    read_measured(reader, row, columns, m);
+    for (const std::size_t c : extra) m.extra.push_back(row.cells[c]);
+    data.rows.push_back(std::move(m));
+  }
+  if (measured) {
+    refuse_repeats(table);
+    if (!robot.has_noise && !data.columns.position_sigma) {
+      data.warnings.push_back(fmt::format(
+          "{}: neither it (sigma_mm) nor {} (noise) says how exact the measurement is; {:.3g} mm is assumed.",
+          path, robot.path, robot.position_sigma_m * 1e3));
+    }
+  }
+  return data;
+}
+
+std::string joined(const std::vector<std::string>& cells) {
+  return fmt::format("{}\n", fmt::join(cells, ","));
+}
+
+}  // namespace
+
+bool ContextColumns::all_moves() const {
+  return std::all_of(move.begin(), move.end(), [](bool b) { return b; });
+}
+
+bool ContextColumns::all_directions() const {
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (!move[j] && !direction[j]) return false;
+  }
+  return true;
+}
+
+DataFile load_data(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+  return load(path, robot, options, true);
+}
+
+DataFile load_joints(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+  return load(path, robot, options, false);
+}
+
+std::vector<std::string> joint_and_context_names(const ContextColumns& columns) {
+  std::vector<std::string> names;
+  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(joint_name(j));
+  if (columns.payload_mass) names.emplace_back("payload_kg");
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (columns.payload_com[k]) names.push_back(com_name(k));
+  }
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (columns.move[j]) names.push_back(move_name(j));
+  }
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (columns.direction[j]) names.push_back(direction_name(j));
+  }
+  if (columns.temperature) names.emplace_back("temp_c");
+  if (columns.time) names.emplace_back("time_s");
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (columns.force[k]) names.push_back(force_name(k));
+  }
+  return names;
+}
+
+std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row) {
+  const Context<double, joint_count>& c = row.context;
+  std::vector<std::string> cells;
+  for (const double q : row.q_rad) cells.push_back(format_si(q, unit::degree));
+  if (columns.payload_mass) cells.push_back(format_si(c.payload_kg, unit::si));
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (columns.payload_com[k]) cells.push_back(format_si(c.payload_com_m[k], unit::mm));
+  }
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (columns.move[j]) cells.push_back(format_si(row.move_rad[j], unit::degree));
+  }
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (columns.direction[j]) cells.push_back(format_si(c.direction[j], unit::si));
+  }
+  if (columns.temperature) cells.push_back(format_si(c.temperature_c, unit::si));
+  if (columns.time) cells.push_back(format_si(c.time_s, unit::si));
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (columns.force[k]) cells.push_back(format_si(c.force_n[k], unit::si));
+  }
+  return cells;
+}
+
+std::string data_text(const DataFile& data) {
+  std::vector<std::string> names = joint_and_context_names(data.columns);
+  if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
+    for (std::size_t k = 0; k < 3; ++k) names.push_back(position_name(k));
+  }
+  if (data.kind == MeasurementKind::pose)
+    names.insert(names.end(), quaternion_names.begin(), quaternion_names.end());
+  for (std::size_t r = 0; r < data.reflectors; ++r) {
+    for (std::size_t k = 0; k < 3; ++k) names.push_back(point_name(r, k));
+  }
+  if (data.columns.position_sigma) names.emplace_back("sigma_mm");
+  if (data.columns.orientation_sigma) names.emplace_back("sigma_deg");
+  for (const std::string& name : data.extra) names.push_back(csv_cell(name));
+
+  std::string text = joined(names);
+  for (const Measurement& row : data.rows) {
+    std::vector<std::string> cells = joint_and_context_cells(data.columns, row);
+    if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
+      for (const double v : row.position_m) cells.push_back(format_si(v, unit::mm));
+    }
+    if (data.kind == MeasurementKind::pose) {
+      const Eigen::Quaterniond& q = row.orientation;
+      for (const double v : {q.w(), q.x(), q.y(), q.z()}) cells.push_back(format_si(v, unit::si));
+    }
+    for (std::size_t r = 0; r < data.reflectors; ++r) {
+      for (const double v : row.reflector_m[r]) cells.push_back(format_si(v, unit::mm));
+    }
+    if (data.columns.position_sigma) cells.push_back(format_si(row.position_sigma_m, unit::mm));
+    if (data.columns.orientation_sigma) cells.push_back(format_si(row.orientation_sigma_rad, unit::degree));
+    for (const std::string& cell : row.extra) cells.push_back(csv_cell(cell));
+    text += joined(cells);
+  }
+  return text;
+}
+
+void save_data(const std::string& path, const DataFile& data) { write_file(path, data_text(data)); }
+
+TargetsFile load_targets(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+  ColumnReader reader(read_csv(path), robot);
+  TargetsFile targets;
+  targets.path = path;
+  bool any_joint = false;
+  for (std::size_t j = 0; j < joint_count; ++j) any_joint = any_joint || reader.has(joint_name(j));
+  targets.poses =
+      !any_joint && (reader.has("x_mm") || reader.has("y_mm") || reader.has("z_mm") || reader.has("qw"));
+  const char* const choice =
+      "targets: q1_deg … q6_deg, or x_mm y_mm z_mm qw qx qy qz with seed1_deg … seed6_deg";
+  std::array<std::size_t, joint_count> joints{};
+  MeasuredColumns pose;
+  if (targets.poses) {
+    for (std::size_t k = 0; k < 3; ++k) pose.position[k] = reader.require(position_name(k), choice);
+    for (std::size_t k = 0; k < 4; ++k) pose.quaternion[k] = reader.require(quaternion_names[k], choice);
+    pose.kind = MeasurementKind::pose;
+    joints = reader.require_joints(seed_name, "a pose needs seed1_deg … seed6_deg to choose the branch");
+  } else {
+    joints = reader.require_joints(joint_name, choice);
+  }
+  const std::vector<std::size_t> extra = reader.unused(targets.extra, targets.warnings);
+  const CsvTable& table = reader.table();
+  if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
+  reader.suspect_radians(joints, options);
+  for (const CsvRow& row : table.rows) {
+    Measurement m;
+    reader.read_joints(row, joints, m.q_rad, targets.poses);
+    reader.read_context(row, m);
+    read_measured(reader, row, pose, m);
+    Target target;
+    target.line = row.line;
+    target.q_rad = m.q_rad;
+    target.position_m = m.position_m;
+    target.orientation = m.orientation;
+    target.context = m.context;
+    for (const std::size_t c : extra) target.extra.push_back(row.cells[c]);
+    targets.rows.push_back(std::move(target));
+  }
+  return targets;
+}
+
+}  // namespace flexcomp::host

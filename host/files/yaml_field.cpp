@@ -1,0 +1,165 @@
+#include "files/yaml_field.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "files/nearest.hpp"
+#include "files/quaternion.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+std::size_t line_of(const YAML::Mark& mark) {
+  return mark.line < 0 ? 0 : static_cast<std::size_t>(mark.line) + 1;
+}
+
+std::string describe(const YAML::Node& node) {
+  switch (node.Type()) {
+    case YAML::NodeType::Scalar:
+      return "'" + node.Scalar() + "'";
+    case YAML::NodeType::Sequence:
+      return fmt::format("a list of {}", node.size());
+    case YAML::NodeType::Map:
+      return "a mapping";
+    default:
+      return "nothing";
+  }
+}
+
+}  // namespace
+
+YamlField::YamlField(YAML::Node node, std::string file, std::string path, std::size_t line)
+    : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)), line_(line) {}
+
+YamlField YamlField::load(const std::string& path) {
+  try {
+    YamlField root(YAML::LoadFile(path), path, "", 1);
+    if (!root.node_.IsMap()) throw InputError(path, 0, "", "a mapping (key: value)", describe(root.node_));
+    return root;
+  } catch (const YAML::BadFile&) {
+    throw InputError(path, 0, "", "a file that can be read", "none");
+  } catch (const YAML::Exception& e) {
+    throw InputError(path, line_of(e.mark), "", "YAML", e.msg);
+  }
+}
+
+std::size_t YamlField::line() const { return line_; }
+
+InputError YamlField::error(const std::string& expected) const { return error(expected, describe(node_)); }
+
+InputError YamlField::error(const std::string& expected, const std::string& found) const {
+  return {file_, line_, path_, expected, found};
+}
+
+std::vector<std::string> YamlField::keys() const {
+  if (!node_.IsMap()) throw error("a mapping (key: value)");
+  std::vector<std::string> names;
+  for (const auto& pair : node_) names.push_back(pair.first.IsScalar() ? pair.first.Scalar() : std::string());
+  return names;
+}
+
+void YamlField::require_keys(const std::vector<std::string>& known) const {
+  if (!node_.IsMap()) throw error("a mapping (key: value)");
+  std::vector<std::string> seen;
+  for (const auto& pair : node_) {
+    const std::string key = pair.first.IsScalar() ? pair.first.Scalar() : describe(pair.first);
+    const std::string field = path_.empty() ? key : path_ + "." + key;
+    const std::size_t line = line_of(pair.first.Mark());
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      const std::string near = nearest(key, known);
+      std::string expected = near.empty() ? "one of the keys " : "a known key (did you mean '" + near + "'?)";
+      if (near.empty()) expected += fmt::format("{}", fmt::join(known, ", "));
+      throw InputError(file_, line, field, expected, "the unknown key '" + key + "'");
+    }
+    if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
+      throw InputError(file_, line, field, "each key once", "'" + key + "' a second time");
+    }
+    seen.push_back(key);
+  }
+}
+
+std::optional<YamlField> YamlField::find(const std::string& key) const {
+  if (!node_.IsMap()) throw error("a mapping (key: value)");
+  for (const auto& pair : node_) {
+    if (pair.first.IsScalar() && pair.first.Scalar() == key) {
+      const std::string field = path_.empty() ? key : path_ + "." + key;
+      return YamlField(pair.second, file_, field, line_of(pair.first.Mark()));
+    }
+  }
+  return {};
+}
+
+YamlField YamlField::at(const std::string& key) const {
+  const auto field = find(key);
+  if (!field) throw InputError(file_, line_, path_.empty() ? key : path_ + "." + key, "this key", "nothing");
+  return *field;
+}
+
+std::vector<YamlField> YamlField::items() const {
+  if (!node_.IsSequence()) throw error("a list");
+  std::vector<YamlField> fields;
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    const YAML::Node item = node_[k];
+    const std::size_t line = line_of(item.Mark());
+    fields.push_back(YamlField(item, file_, fmt::format("{}[{}]", path_, k + 1), line == 0 ? line_ : line));
+  }
+  return fields;
+}
+
+std::string YamlField::text() const {
+  if (!node_.IsScalar() || node_.Scalar().empty()) throw error("a name or text");
+  return node_.Scalar();
+}
+
+double YamlField::number(const Unit& unit) const {
+  const auto value = node_.IsScalar() ? parse_si(node_.Scalar(), unit) : std::nullopt;
+  if (!value) throw error("a finite number");
+  return *value;
+}
+
+double YamlField::number(const Unit& unit, double above, const std::string& expected) const {
+  const double value = number(unit);
+  if (!(value > above)) throw error(expected);
+  return value;
+}
+
+unsigned YamlField::integer(unsigned least, unsigned most) const {
+  unsigned value = 0;
+  const std::string& text = node_.IsScalar() ? node_.Scalar() : std::string();
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || failure != std::errc() || end != text.data() + text.size() || value < least ||
+      value > most) {
+    throw error(fmt::format("an integer from {} to {}", least, most));
+  }
+  return value;
+}
+
+Eigen::Vector3d YamlField::vector3(const Unit& unit) const {
+  if (!node_.IsSequence() || node_.size() != 3) throw error("a list of three numbers");
+  const std::vector<YamlField> parts = items();
+  return {parts[0].number(unit), parts[1].number(unit), parts[2].number(unit)};
+}
+
+Eigen::Quaterniond YamlField::quaternion() const {
+  if (!node_.IsSequence() || node_.size() != 4) throw error("a list of four numbers, w x y z");
+  const std::vector<YamlField> parts = items();
+  const std::array<double, 4> wxyz{parts[0].number(unit::si), parts[1].number(unit::si),
+                                   parts[2].number(unit::si), parts[3].number(unit::si)};
+  const auto q = unit_quaternion(wxyz);
+  if (!q) {
+    const double norm = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm();
+    throw error("a quaternion w x y z of norm 1 (within 0.001)", fmt::format("norm {:.6g}", norm));
+  }
+  return *q;
+}
+
+double YamlField::number_or(const std::string& key, const Unit& unit, double otherwise) const {
+  const auto field = find(key);
+  return field ? field->number(unit) : otherwise;
+}
+
+}  // namespace flexcomp::host

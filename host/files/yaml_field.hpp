@@ -1,0 +1,66 @@
+/// \file
+/// A node of a YAML file that knows where it stands, so that whatever is wrong with it can be said with file, line and
+/// field.
+#ifndef FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
+#define FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "files/input_error.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+class YamlField {
+ public:
+  /// The root of a file. \throws InputError  absent, unreadable, no YAML, empty
+  static YamlField load(const std::string& path);
+
+  std::size_t line() const;
+  const std::string& path() const { return path_; }  ///< joints[3].a_mm
+  const std::string& file() const { return file_; }
+
+  /// To be thrown: this field is not what was expected; what was found is described from the node.
+  InputError error(const std::string& expected) const;
+  InputError error(const std::string& expected, const std::string& found) const;
+
+  /// A mapping without keys beyond `known` and without one twice. \throws InputError
+  void require_keys(const std::vector<std::string>& known) const;
+  bool has(const std::string& key) const { return find(key).has_value(); }
+  std::optional<YamlField> find(const std::string& key) const;
+  YamlField at(const std::string& key) const;  ///< \throws InputError where the key is missing
+  std::vector<std::string> keys() const;       ///< of a mapping, in the order of the file
+
+  /// A sequence. \throws InputError
+  std::vector<YamlField> items() const;
+
+  std::string text() const;  ///< a non-empty scalar
+  double number(const Unit& unit) const;
+  double number(const Unit& unit, double above, const std::string& expected) const;  ///< greater than `above`
+  unsigned integer(unsigned least, unsigned most) const;
+  Eigen::Vector3d vector3(const Unit& unit) const;
+  /// w x y z; norm within 1e-3 of 1, normalised, w >= 0
+  Eigen::Quaterniond quaternion() const;
+
+  /// The same for members that may be absent.
+  double number_or(const std::string& key, const Unit& unit, double otherwise) const;
+
+ private:
+  YamlField(YAML::Node node, std::string file, std::string path, std::size_t line);
+
+  YAML::Node node_;
+  std::string file_;
+  std::string path_;
+  std::size_t line_;
+};
+
+}  // namespace flexcomp::host
+
+#endif

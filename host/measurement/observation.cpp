@@ -1,0 +1,111 @@
+#include "measurement/observation.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+
+#include "files/input_error.hpp"
+#include "measurement/reflectors.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr double improbable = 1e-6;
+
+std::vector<Points> reflector_rows(const DataFile& data) {
+  std::vector<Points> rows;
+  for (const Measurement& m : data.rows) {
+    rows.emplace_back(m.reflector_m.begin(),
+                      m.reflector_m.begin() + static_cast<std::ptrdiff_t>(data.reflectors));
+    if (on_one_line(rows.back())) {
+      throw InputError(data.path, m.line, "ax_mm … cz_mm", "three reflectors that are not on one line",
+                       "A, B, C on one line");
+    }
+  }
+  return rows;
+}
+
+/// The template in the order of the data's columns: the robot file's, or the mean shape of the data.
+Points choose_template(const DataFile& data, const RobotFile& robot, const std::vector<Points>& rows) {
+  if (robot.reflectors_m.empty()) return estimate_template(rows);
+  if (robot.reflectors_m.size() < data.reflectors) {
+    throw InputError(robot.path, 0, "tool.reflectors_mm.d",
+                     fmt::format("reflector D, which {} has", data.path), "nothing");
+  }
+  Points shape(robot.reflectors_m.begin(),
+               robot.reflectors_m.begin() + static_cast<std::ptrdiff_t>(data.reflectors));
+  if (on_one_line(shape)) {
+    throw InputError(robot.path, 0, "tool.reflectors_mm", "three reflectors that are not on one line",
+                     "A, B, C on one line");
+  }
+  return shape;
+}
+
+void warn(const DataFile& data, const RobotFile& robot, const std::vector<std::string>& slipped,
+          std::vector<std::string>& warnings) {
+  if (2 * slipped.size() > data.rows.size() && !robot.reflectors_m.empty()) {
+    warnings.push_back(fmt::format(
+        "{}: in {} of {} rows the distances between the reflectors are not those of {} (tool.reflectors_mm): "
+        "either the "
+        "template or sigma_mm is wrong; without reflectors_mm the template is estimated from the data.",
+        data.path, slipped.size(), data.rows.size(), robot.path));
+    return;
+  }
+  warnings.insert(warnings.end(), slipped.begin(), slipped.end());
+}
+
+void observe_reflectors(const DataFile& data, const RobotFile& robot, std::vector<Observation>& observations,
+                        std::vector<std::string>* warnings) {
+  const std::vector<Points> rows = reflector_rows(data);
+  const Points shape = choose_template(data, robot, rows);
+  std::vector<std::string> slipped;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Measurement& m = data.rows[k];
+    Observation& o = observations[k];
+    const RigidFit fit = fit_rigid(rows[k], shape);
+    o.has_orientation = true;
+    o.p_m = fit.pose.position;
+    o.R = fit.pose.rotation;
+    const Matrix6d information = fit_information(fit.pose, shape, m.position_sigma_m);
+    o.whitening = information.llt().matrixU();
+    o.misfit_chi2 = fit.squares_m2 / (m.position_sigma_m * m.position_sigma_m);
+    o.misfit_dof = 3 * data.reflectors - 6;
+    if (misfit_probability(o.misfit_chi2, o.misfit_dof) < improbable) {
+      slipped.push_back(
+          fmt::format("{}:{}: reflector {} has moved or is badly seated: the distances to the others are off "
+                      "(misfit {:.3f} mm rms).",
+                      data.path, m.line, "ABCD"[suspect_reflector(rows[k], shape)],
+                      1e3 * std::sqrt(fit.squares_m2 / static_cast<double>(data.reflectors))));
+    }
+  }
+  if (warnings != nullptr) warn(data, robot, slipped, *warnings);
+}
+
+}  // namespace
+
+std::vector<Observation> observe(const DataFile& data, const RobotFile& robot,
+                                 std::vector<std::string>* warnings) {
+  if (data.kind == MeasurementKind::joints) {
+    throw InputError(data.path, 1, "", "something measured (x_mm y_mm z_mm or reflectors)", "joints only");
+  }
+  std::vector<Observation> observations(data.rows.size());
+  for (std::size_t k = 0; k < data.rows.size(); ++k) {
+    const Measurement& m = data.rows[k];
+    Observation& o = observations[k];
+    o.q_rad = m.q_rad;
+    o.context = m.context;
+    o.line = m.line;
+    o.p_m = m.position_m;
+    o.whitening.topLeftCorner<3, 3>().diagonal().setConstant(1 / m.position_sigma_m);
+    if (data.kind == MeasurementKind::pose) {
+      o.has_orientation = true;
+      o.R = m.orientation.toRotationMatrix();
+      o.whitening.bottomRightCorner<3, 3>().diagonal().setConstant(1 / m.orientation_sigma_rad);
+    }
+  }
+  if (data.kind == MeasurementKind::reflectors) observe_reflectors(data, robot, observations, warnings);
+  return observations;
+}
+
+}  // namespace flexcomp::host
