@@ -1,0 +1,149 @@
+#include "bus/bus_address.hpp"
+
+#include <fmt/format.h>
+#include <net/if.h>
+
+#include <charconv>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+namespace flexcomp::host {
+namespace {
+
+constexpr std::string_view can_form = "can:IFACE[:NODE]";
+constexpr std::string_view tcp_form = "modbus-tcp:HOST[:PORT][:UNIT]";
+constexpr std::string_view rtu_form = "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]";
+
+/// Says what is wrong with one address.
+class Complaint {
+ public:
+  Complaint(std::string_view address, std::string_view form) : address_(address), form_(form) {}
+  [[noreturn]] void operator()(const std::string& what) const {
+    throw std::invalid_argument(fmt::format("bus address '{}': {}; expected {}", address_, what, form_));
+  }
+
+ private:
+  std::string_view address_;
+  std::string_view form_;
+};
+
+/// The whole text as a decimal number.
+std::optional<std::uint32_t> number(std::string_view text) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+template <class T>
+T in_range(std::string_view text, std::string_view what, T least, T most, const Complaint& complain) {
+  const std::optional<std::uint32_t> value = number(text);
+  if (!value || *value < least || *value > most) {
+    complain(fmt::format("{} is a whole number from {} to {}, not '{}'", what, least, most, text));
+  }
+  return static_cast<T>(*value);
+}
+
+std::vector<std::string_view> fields(std::string_view text) {
+  std::vector<std::string_view> out;
+  for (;;) {
+    const std::size_t colon = text.find(':');
+    out.push_back(text.substr(0, colon));
+    if (colon == std::string_view::npos) return out;
+    text.remove_prefix(colon + 1);
+  }
+}
+
+CanAddress parse_can(std::string_view rest, const Complaint& complain) {
+  const std::vector<std::string_view> part = fields(rest);
+  if (part.size() > 2) complain("there are too many fields");
+  if (part[0].empty()) complain("the interface is missing");
+  // A longer name would be cut off and could name another interface.
+  if (part[0].size() >= IF_NAMESIZE) {
+    complain(fmt::format("the name of an interface has at most {} characters", IF_NAMESIZE - 1));
+  }
+  CanAddress out;
+  out.interface = part[0];
+  if (part.size() > 1) out.node = in_range<std::uint8_t>(part[1], "NODE", 1, 127, complain);
+  return out;
+}
+
+ModbusTcpAddress parse_tcp(std::string_view rest, const Complaint& complain) {
+  ModbusTcpAddress out;
+  std::vector<std::string_view> part;
+  if (rest.starts_with('[')) {
+    const std::size_t close = rest.find(']');
+    if (close == std::string_view::npos) complain("the bracket is not closed");
+    out.host = rest.substr(1, close - 1);
+    part = fields(rest.substr(close + 1));
+    if (!part[0].empty()) complain(fmt::format("'{}' follows the bracket", part[0]));
+  } else {
+    part = fields(rest);
+    out.host = part[0];
+  }
+  if (out.host.empty()) complain("the host is missing");
+  if (part.size() > 3) complain("there are too many fields (an IPv6 address stands in square brackets)");
+  if (part.size() > 1) out.port = in_range<std::uint16_t>(part[1], "PORT", 1, 65535, complain);
+  if (part.size() > 2) out.unit = in_range<std::uint8_t>(part[2], "UNIT", 0, 255, complain);
+  return out;
+}
+
+ModbusRtuAddress parse_rtu(std::string_view rest, const Complaint& complain) {
+  ModbusRtuAddress out;
+  constexpr std::uint32_t most_units = 247;
+  std::vector<std::string_view> part = fields(rest);
+  const auto last_number = [&part]() -> std::optional<std::uint32_t> {
+    return part.size() > 1 ? number(part.back()) : std::nullopt;
+  };
+  if (const auto n = last_number(); n && *n <= most_units) {
+    out.unit = in_range<std::uint8_t>(part.back(), "UNIT", 1, most_units, complain);
+    part.pop_back();
+  }
+  const bool one_letter = part.size() > 1 && part.back().size() == 1 && !number(part.back());
+  if (one_letter) {
+    const char letter = part.back()[0];
+    const std::string_view known = "NEOneo";
+    const std::size_t k = known.find(letter);
+    if (k == std::string_view::npos) complain(fmt::format("PARITY is N, E or O, not '{}'", letter));
+    out.parity = static_cast<Parity>(known[k % 3]);
+    part.pop_back();
+    if (!last_number()) complain("PARITY stands behind a BAUD");
+  }
+  if (last_number()) {
+    out.baud = in_range<std::uint32_t>(part.back(), "BAUD", 300, 4000000, complain);
+    part.pop_back();
+  }
+  // What is left is the device, whose own colons belong to it.
+  const std::size_t length = static_cast<std::size_t>(part.back().data() + part.back().size() - rest.data());
+  out.device = rest.substr(0, length);
+  if (out.device.empty()) complain("the device is missing");
+  return out;
+}
+
+}  // namespace
+
+std::string BusAddress::text() const {
+  if (const auto* can = std::get_if<CanAddress>(&at))
+    return fmt::format("can:{}:{}", can->interface, can->node);
+  if (const auto* tcp = std::get_if<ModbusTcpAddress>(&at)) {
+    const bool v6 = tcp->host.find(':') != std::string::npos;
+    return fmt::format("modbus-tcp:{}{}{}:{}:{}", v6 ? "[" : "", tcp->host, v6 ? "]" : "", tcp->port,
+                       tcp->unit);
+  }
+  const auto& rtu = std::get<ModbusRtuAddress>(at);
+  return fmt::format("modbus-rtu:{}:{}:{}:{}", rtu.device, rtu.baud, static_cast<char>(rtu.parity), rtu.unit);
+}
+
+BusAddress parse_bus_address(std::string_view text) {
+  const auto rest = [text](std::string_view scheme) -> std::optional<std::string_view> {
+    if (!text.starts_with(scheme)) return std::nullopt;
+    return text.substr(scheme.size());
+  };
+  if (const auto can = rest("can:")) return {parse_can(*can, {text, can_form})};
+  if (const auto tcp = rest("modbus-tcp:")) return {parse_tcp(*tcp, {text, tcp_form})};
+  if (const auto rtu = rest("modbus-rtu:")) return {parse_rtu(*rtu, {text, rtu_form})};
+  Complaint{text, fmt::format("{}, {} or {}", can_form, tcp_form, rtu_form)}("no such kind of bus");
+}
+
+}  // namespace flexcomp::host

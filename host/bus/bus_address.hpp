@@ -1,0 +1,53 @@
+/// \file
+/// How a controller is named on the command line: which bus, where on it, and as whom.
+///
+///     can:IFACE[:NODE]                          NODE 1 … 127, default 1
+///     modbus-tcp:HOST[:PORT][:UNIT]             PORT default 502, UNIT 0 … 255, default 255 (the device itself)
+///     modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]  BAUD default 19200, PARITY N, E or O, default E, UNIT 1 … 247, default 1
+///
+/// The defaults are those of the standards (Modbus messaging on TCP/IP 1.0b, 4.4.1; serial line 1.02, 2.5.1). An IPv6
+/// address stands in square brackets. A serial line's fields are read from the right, so a DEVICE may have colons of
+/// its own; a single number of at most 247 is a UNIT, a larger one a BAUD.
+#ifndef FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
+#define FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+
+namespace flexcomp::host {
+
+struct CanAddress {
+  std::string interface;
+  std::uint8_t node = 1;
+};
+
+struct ModbusTcpAddress {
+  std::string host;
+  std::uint16_t port = 502;
+  std::uint8_t unit = 255;
+};
+
+enum class Parity : char { none = 'N', even = 'E', odd = 'O' };
+
+struct ModbusRtuAddress {
+  std::string device;
+  std::uint32_t baud = 19200;
+  Parity parity = Parity::even;
+  std::uint8_t unit = 1;
+};
+
+struct BusAddress {
+  std::variant<CanAddress, ModbusTcpAddress, ModbusRtuAddress> at;
+
+  /// In full, with the defaults filled in: can:vcan0:1.
+  std::string text() const;
+};
+
+/// \throws std::invalid_argument  what is wrong with the address, and the form that is expected
+BusAddress parse_bus_address(std::string_view text);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,211 @@
+#include "bus/canopen_client.hpp"
+
+#include <fmt/format.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "bus/sdo_client.hpp"
+#include "flexcomp/bytes.hpp"
+#include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp/wire/robot_record.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+namespace co = wire::canopen;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+/// An open file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
+
+Descriptor open_can(const std::string& interface, unsigned node, const std::string& where) {
+  Descriptor out(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
+  if (out.get() < 0) {
+    throw BusError(fmt::format("{}: this system gives no CAN sockets: {}", where, reason(errno)));
+  }
+  const unsigned index = if_nametoindex(interface.c_str());
+  if (index == 0) throw BusError(fmt::format("{}: there is no interface '{}'", where, interface));
+  // Extended, remote and other nodes' frames stay in the kernel.
+  const can_filter answers{co::sdo_answer_id + node, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+  sockaddr_can to{};
+  to.can_family = AF_CAN;
+  to.can_ifindex = static_cast<int>(index);
+  if (::setsockopt(out.get(), SOL_CAN_RAW, CAN_RAW_FILTER, &answers, sizeof answers) != 0 ||
+      ::bind(out.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
+    throw BusError(fmt::format("{}: the interface '{}' cannot be used: {}", where, interface, reason(errno)));
+  }
+  return out;
+}
+
+/// An SDO channel has one client: two would take each other's answers for their own. Programs on this machine take
+/// turns by a name that only one of them can have; it is as wide as the interface (one network namespace) and goes
+/// with the process, however it ends.
+Descriptor take_channel(const CanAddress& can, const ClientOptions& options, const std::string& where) {
+  Descriptor out(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (out.get() < 0) throw BusError(fmt::format("{}: no local socket: {}", where, reason(errno)));
+  const std::string name = fmt::format("flexcomp-sdo-{}-{}", can.interface, can.node);
+  sockaddr_un at{};
+  at.sun_family = AF_UNIX;
+  // The first byte stays 0: a name without a file.
+  std::copy(name.begin(), name.end(), at.sun_path + 1);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  const auto end = steady_clock::now() + options.patience;
+  while (::bind(out.get(), reinterpret_cast<const sockaddr*>(&at), size) != 0) {
+    if (errno != EADDRINUSE) throw BusError(fmt::format("{}: {}", where, reason(errno)));
+    if (steady_clock::now() > end) {
+      throw BusError(
+          fmt::format("{}: another program on this machine has been talking to node {} for {:.1f} s", where,
+                      can.node, seconds(options.patience)));
+    }
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  return out;
+}
+
+class CanopenClient final : public ControllerClient {
+ public:
+  CanopenClient(const BusAddress& address, const ClientOptions& options, Descriptor channel,
+                Descriptor socket)
+      : ControllerClient(address, options),
+        node_(std::get<CanAddress>(address.at).node),
+        timeout_(options.patience / attempts),
+        channel_(std::move(channel)),
+        socket_(std::move(socket)),
+        sdo_(socket_.get(), node_, timeout_) {
+    greet();
+  }
+
+ protected:
+  wire::ByteOrder byte_order() const override { return wire::ByteOrder::little; }
+
+  Bytes read_record(Record record, std::size_t size) override {
+    ObjectAddress object{co::capability, 0};
+    if (record == Record::status) object.index = co::status;
+    if (record == Record::robot) object.index = co::robot;
+    return upload(object, size);
+  }
+
+  void send_image(std::span<const std::uint8_t> image, const Progress& progress) override {
+    // The whole transfer again where a frame got lost: an aborted one leaves nothing behind.
+    download({co::image, co::image_staging}, image, attempts, progress);
+  }
+
+  void send_command(wire::Command command, std::uint32_t argument) override {
+    std::array<std::uint8_t, 4> bytes{};
+    if (argument != 0 || last_argument_ != 0) {
+      store_u32(bytes.data(), argument);
+      download({co::command, co::command_argument}, bytes, attempts);
+      last_argument_ = argument;
+    }
+    store_u16(bytes.data(), static_cast<std::uint16_t>(command));
+    // Sent once: a command whose answer got lost may have been carried out.
+    download({co::command, co::command_number}, std::span(bytes).first(2), 1);
+  }
+
+  Bytes read_image(std::size_t size, const Progress& progress) override {
+    return upload({co::image, co::image_active}, size, progress);
+  }
+
+  Bytes answer_probe(std::span<const std::uint8_t> request) override {
+    download({co::probe, co::probe_request}, request, attempts);
+    return upload({co::probe, co::probe_response}, wire::probe_response_bytes);
+  }
+
+ private:
+  static constexpr int attempts = 3;
+
+  Bytes upload(ObjectAddress object, std::size_t size, const Progress& progress = {}) {
+    Bytes out;
+    ask("to read", object, attempts, [&] { out = sdo_.upload(object, progress); });
+    if (out.size() != size) {
+      throw BusError(fmt::format("{}: object {} of node {} has {} bytes, expected {}", where(), object.text(),
+                                 node_, out.size(), size));
+    }
+    return out;
+  }
+
+  void download(ObjectAddress object, std::span<const std::uint8_t> data, int times,
+                const Progress& progress = {}) {
+    ask("to write", object, times, [&] { sdo_.download(object, data, progress); });
+  }
+
+  template <class Transfer>
+  void ask(const char* what, ObjectAddress object, int times, const Transfer& transfer) {
+    for (int attempt = 1;; ++attempt) {
+      try {
+        transfer();
+        return;
+      } catch (const SdoAbort& e) {
+        // The server has lost the thread of a transfer of which a frame got lost.
+        const bool lost = !e.by_server() || e.code() == co::abort::toggle || e.code() == co::abort::timeout ||
+                          e.code() == co::abort::command;
+        if (lost && attempt < times) continue;
+        if (!e.by_server()) throw BusError(fmt::format("{}: node {}: {}", where(), node_, e.what()));
+        throw SaidNo{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
+      } catch (const SdoTimeout& e) {
+        if (attempt < times) continue;
+        throw NoAnswer(fmt::format("{}: node {} did not answer when asked {} object {} ({} of {:.2f} s): {}",
+                                   where(), node_, what, object.text(),
+                                   times == 1 ? "one wait" : fmt::format("{} waits", times),
+                                   seconds(timeout_), e.what()));
+      } catch (const std::system_error& e) {
+        throw BusError(fmt::format("{}: {}", where(), e.what()));
+      }
+    }
+  }
+
+  std::uint8_t node_;
+  milliseconds timeout_;
+  Descriptor channel_;
+  Descriptor socket_;
+  SdoClient sdo_;
+  std::uint32_t last_argument_ = 1;  ///< another client's may still be there
+};
+
+}  // namespace
+
+std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options) {
+  const auto& can = std::get<CanAddress>(address.at);
+  Descriptor socket = open_can(can.interface, can.node, address.text());
+  Descriptor channel = take_channel(can, options, address.text());
+  return std::make_unique<CanopenClient>(address, options, std::move(channel), std::move(socket));
+}
+
+std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options,
+                                                  int socket) {
+  return std::make_unique<CanopenClient>(address, options, Descriptor(), Descriptor(socket));
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,232 @@
+#include "bus/controller_client.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <thread>
+#include <utility>
+
+#include "bus/canopen_client.hpp"
+#include "bus/modbus_client.hpp"
+#include "flexcomp/wire/robot_record.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr milliseconds between_questions{10};
+
+/// A set that is longer than this is no image of ours, whatever the controller says.
+constexpr std::size_t longest_image = std::size_t{1} << 24U;
+
+bool writes_memory(wire::Command command) {
+  return command == wire::Command::commit || command == wire::Command::commit_trial ||
+         command == wire::Command::confirm || command == wire::Command::rollback ||
+         command == wire::Command::restore_defaults;
+}
+
+}  // namespace
+
+std::string describe(wire::Command command) {
+  switch (command) {
+    case wire::Command::begin:
+      return "announce a set";
+    case wire::Command::verify:
+      return "verify the set";
+    case wire::Command::commit:
+      return "commit the set";
+    case wire::Command::commit_trial:
+      return "commit the set on trial";
+    case wire::Command::confirm:
+      return "confirm the set on trial";
+    case wire::Command::rollback:
+      return "roll back";
+    case wire::Command::abort:
+      return "drop what is staged";
+    case wire::Command::restore_defaults:
+      return "erase both sets";
+    case wire::Command::none:
+      break;
+  }
+  return "nothing";
+}
+
+std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail) {
+  if (answer != wire::Answer::refused) return wire::text(answer);
+  std::string out = text(refusal);
+  switch (refusal) {
+    case Refusal::unknown_basis:
+      out += fmt::format(" (basis {})", detail);
+      break;
+    case Refusal::too_long:
+      out += fmt::format(" (of {} bytes)", detail);
+      break;
+    case Refusal::stale_sequence:
+      out += fmt::format(" ({})", detail);
+      break;
+    case Refusal::implausible:
+      out += fmt::format(" (by {:.3f} mm or mrad)", detail / 1000.0);
+      break;
+    default:
+      break;
+  }
+  return out;
+}
+
+ControllerClient::ControllerClient(BusAddress address, const ClientOptions& options)
+    : address_(std::move(address)), options_(options), where_(address_.text()) {}
+
+void ControllerClient::greet() {
+  Bytes bytes;
+  insist("read its capabilities", [&] { bytes = read_record(Record::capability, wire::capability_bytes); });
+  wire::decode(bytes.data(), byte_order(), capability_);
+  constexpr unsigned major = wire::protocol_version >> 8U;
+  if (capability_.protocol >> 8U != major || capability_.joints != wire::joints) {
+    throw BusError(fmt::format(
+        "{}: what answers is no flexcomp controller that this program knows: it says protocol {}.{} and {} "
+        "joints, expected protocol {}.x and {} joints",
+        where_, capability_.protocol >> 8U, capability_.protocol & 0xFFU, capability_.joints, major,
+        wire::joints));
+  }
+}
+
+wire::Status ControllerClient::status() {
+  Bytes bytes;
+  insist("read its status", [&] { bytes = read_record(Record::status, wire::status_bytes); });
+  wire::Status out;
+  wire::decode(bytes.data(), byte_order(), out);
+  return out;
+}
+
+std::optional<RobotFile> ControllerClient::robot() {
+  Bytes bytes;
+  try {
+    bytes = read_record(Record::robot, wire::robot_record_bytes);
+  } catch (const SaidNo& no) {
+    if (no.no_such_object) return std::nullopt;
+    explain("read which robot it is for", no);
+  }
+  RobotFile out;
+  std::array<char, wire::robot_name_bytes> name{};
+  const std::size_t size = wire::decode(bytes.data(), byte_order(), out.nominal, name.data());
+  out.path = fmt::format("the controller at {}", where_);
+  out.name.assign(name.data(), size);
+  out.nominal.name_hash = capability_.name_hash;
+  if (nominal_hash(out.nominal) != capability_.nominal_hash ||
+      (size != 0 && name_hash(name.data(), size) != capability_.name_hash)) {
+    throw BusError(
+        fmt::format("{}: the robot that the controller tells ('{}') does not have the hashes that it tells",
+                    where_, out.name));
+  }
+  return out;
+}
+
+void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress& progress) {
+  insist("take in a set", [&] { send_image(image, progress); });
+}
+
+void ControllerClient::run(wire::Command command, std::uint32_t argument) {
+  const std::string what = describe(command);
+  insist(what, [&] { send_command(command, argument); });
+  if (!writes_memory(command)) return;
+  const auto end = steady_clock::now() + options_.working;
+  for (;;) {
+    const wire::Status now = status();
+    const auto answer = static_cast<wire::Answer>(now.answer);
+    if (now.state != static_cast<std::uint16_t>(wire::StoreState::working)) {
+      if (answer == wire::Answer::accepted) return;
+      const auto refusal = static_cast<Refusal>(now.refusal);
+      throw RefusedByController(fmt::format("{}: asked to {}, the controller failed: {}", where_, what,
+                                            describe(answer, refusal, now.detail)),
+                                answer, refusal);
+    }
+    if (steady_clock::now() > end) {
+      throw NoAnswer(fmt::format("{}: asked to {}, the controller is still writing its memory after {:.1f} s",
+                                 where_, what, static_cast<double>(options_.working.count()) / 1000));
+    }
+    std::this_thread::sleep_for(between_questions);
+  }
+}
+
+Bytes ControllerClient::active_image(const Progress& progress) {
+  // The set may change between two requests: what was read counts only if the same set was active before and after.
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const wire::Status before = status();
+    if (before.active_slot == wire::no_slot) return {};
+    if (before.active_bytes > longest_image) {
+      throw BusError(
+          fmt::format("{}: the controller tells of an active set of {} bytes", where_, before.active_bytes));
+    }
+    Bytes image;
+    try {
+      insist("read the active set", [&] { image = read_image(before.active_bytes, progress); });
+    } catch (const RefusedByController&) {
+      if (status().active_sequence == before.active_sequence) throw;
+      continue;
+    }
+    const wire::Status after = status();
+    if (after.active_sequence == before.active_sequence && after.active_crc == before.active_crc &&
+        after.active_slot == before.active_slot) {
+      return image;
+    }
+  }
+  throw BusError(fmt::format("{}: the active set changed each of the three times that it was read", where_));
+}
+
+wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
+  std::array<std::uint8_t, wire::probe_request_bytes> question{};
+  wire::encode(request, byte_order(), question.data());
+  Bytes bytes;
+  insist("answer a probe", [&] { bytes = answer_probe(question); });
+  wire::ProbeResponse out;
+  wire::decode(bytes.data(), byte_order(), out);
+  return out;
+}
+
+/// Busy is a matter of moments: another client's transfer, or the cycle has not taken the last set yet.
+template <class Action>
+void ControllerClient::insist(const std::string& what, const Action& action) {
+  const auto end = steady_clock::now() + options_.patience;
+  for (;;) {
+    try {
+      action();
+      return;
+    } catch (const SaidNo& no) {
+      if (!no.busy || steady_clock::now() > end) explain(what, no);
+    }
+    std::this_thread::sleep_for(2 * between_questions);
+  }
+}
+
+void ControllerClient::explain(const std::string& what, const SaidNo& no) {
+  // The bus has one number for many reasons; the status record has the reason.
+  wire::Status now;
+  try {
+    const Bytes bytes = read_record(Record::status, wire::status_bytes);
+    wire::decode(bytes.data(), byte_order(), now);
+  } catch (...) {
+    now.answer = 0xFFFF;
+  }
+  const auto answer = static_cast<wire::Answer>(now.answer);
+  const auto refusal = static_cast<Refusal>(now.refusal);
+  const bool told = now.answer != 0xFFFF && answer != wire::Answer::accepted;
+  if (no.busy) {
+    throw RefusedByController(
+        fmt::format("{}: asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
+                    where_, what, static_cast<double>(options_.patience.count()) / 1000, no.code),
+        wire::Answer::busy, Refusal::none);
+  }
+  throw RefusedByController(
+      fmt::format("{}: asked to {}, the controller refused: {}", where_, what,
+                  told ? fmt::format("{} ({})", describe(answer, refusal, now.detail), no.code) : no.code),
+      told ? answer : wire::Answer::refused, told ? refusal : Refusal::none);
+}
+
+std::unique_ptr<ControllerClient> connect(const BusAddress& address, const ClientOptions& options) {
+  if (std::holds_alternative<CanAddress>(address.at)) return connect_canopen(address, options);
+  return connect_modbus(address, options);
+}
+
+}  // namespace flexcomp::host

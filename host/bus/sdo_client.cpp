@@ -1,0 +1,301 @@
+#include "bus/sdo_client.hpp"
+
+#include <fmt/format.h>
+#include <linux/can.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <thread>
+
+#include "flexcomp/bytes.hpp"
+#include "flexcomp/wire/canopen_objects.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+namespace co = wire::canopen;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+// Command specifiers, the first byte of a frame (CiA 301, 7.2.4.3).
+constexpr unsigned specifier_mask = 0xE0;
+constexpr unsigned download_initiate = 0x20;
+constexpr unsigned download_initiated = 0x60;
+constexpr unsigned download_segment = 0x00;
+constexpr unsigned download_segment_taken = 0x20;
+constexpr unsigned upload_initiate = 0x40;
+constexpr unsigned upload_initiated = 0x40;
+constexpr unsigned upload_segment = 0x60;
+constexpr unsigned upload_segment_given = 0x00;
+constexpr unsigned aborted = 0x80;
+constexpr unsigned expedited = 0x02;
+constexpr unsigned size_indicated = 0x01;
+constexpr unsigned last_segment = 0x01;
+constexpr unsigned toggle_bit = 0x10;
+
+constexpr std::size_t in_segment = 7;
+constexpr std::size_t in_expedited = 4;
+
+/// No object of ours is longer; a server that sends without end is stopped.
+constexpr std::size_t longest = std::size_t{1} << 24U;
+
+void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
+  store_u16(frame.data() + 1, object.index);
+  frame[3] = object.sub;
+}
+
+}  // namespace
+
+std::string ObjectAddress::text() const { return fmt::format("0x{:04X}:{}", index, sub); }
+
+std::string abort_text(std::uint32_t code) {
+  const char* words = "unknown abort code";
+  switch (code) {
+    case 0x05030000:
+      words = "toggle bit not alternated";
+      break;
+    case 0x05040000:
+      words = "SDO protocol timed out";
+      break;
+    case 0x05040001:
+      words = "command specifier not valid or unknown";
+      break;
+    case 0x05040005:
+      words = "out of memory";
+      break;
+    case 0x06010000:
+      words = "unsupported access to an object";
+      break;
+    case 0x06010001:
+      words = "attempt to read a write-only object";
+      break;
+    case 0x06010002:
+      words = "attempt to write a read-only object";
+      break;
+    case 0x06020000:
+      words = "object does not exist";
+      break;
+    case 0x06040043:
+      words = "general parameter incompatibility";
+      break;
+    case 0x06040047:
+      words = "general internal incompatibility in the device";
+      break;
+    case 0x06060000:
+      words = "access failed due to a hardware error";
+      break;
+    case 0x06070010:
+      words = "data type or length does not match";
+      break;
+    case 0x06070012:
+      words = "data type does not match, length too high";
+      break;
+    case 0x06070013:
+      words = "data type does not match, length too low";
+      break;
+    case 0x06090011:
+      words = "sub-index does not exist";
+      break;
+    case 0x06090030:
+      words = "invalid value";
+      break;
+    case 0x06090031:
+      words = "value too high";
+      break;
+    case 0x06090032:
+      words = "value too low";
+      break;
+    case 0x060A0023:
+      words = "resource not available";
+      break;
+    case 0x08000000:
+      words = "general error";
+      break;
+    case 0x08000020:
+      words = "data cannot be transferred or stored";
+      break;
+    case 0x08000021:
+      words = "data cannot be transferred or stored because of local control";
+      break;
+    case 0x08000022:
+      words = "data cannot be transferred or stored because of the present device state";
+      break;
+    case 0x08000024:
+      words = "no data available";
+      break;
+    default:
+      break;
+  }
+  return fmt::format("SDO abort {:04X} {:04X}, {}", code >> 16U, code & 0xFFFFU, words);
+}
+
+SdoAbort::SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server)
+    : std::runtime_error(fmt::format("{} at {}{}", abort_text(code), object.text(),
+                                     by_server ? "" : " (by this program: the answer did not fit)")),
+      code_(code),
+      by_server_(by_server) {}
+
+SdoClient::SdoClient(int socket, std::uint8_t node, milliseconds timeout)
+    : socket_(socket), node_(node), timeout_(timeout) {}
+
+void SdoClient::send(const Payload& payload, steady_clock::time_point end) {
+  can_frame frame{};
+  frame.can_id = co::sdo_request_id + node_;
+  frame.can_dlc = static_cast<__u8>(payload.size());
+  std::copy(payload.begin(), payload.end(), frame.data);
+  while (::send(socket_, &frame, sizeof frame, MSG_NOSIGNAL) != sizeof frame) {
+    // A full transmit queue empties by itself; poll() does not wait for it on every driver.
+    if (errno != ENOBUFS && errno != EAGAIN && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "sending a CAN frame");
+    }
+    if (steady_clock::now() > end) throw SdoTimeout("the bus takes no frame");
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+}
+
+bool SdoClient::receive(Payload& payload, steady_clock::time_point end) {
+  for (;;) {
+    const auto left = std::chrono::ceil<milliseconds>(end - steady_clock::now()).count();
+    pollfd ready{socket_, POLLIN, 0};
+    const int n = ::poll(&ready, 1, static_cast<int>(std::max<long>(left, 0)));
+    if (n < 0 && errno != EINTR)
+      throw std::system_error(errno, std::generic_category(), "waiting for a CAN frame");
+    if (n == 0) return false;
+    if (n < 0) continue;
+    can_frame frame{};
+    const ssize_t size = ::recv(socket_, &frame, sizeof frame, MSG_DONTWAIT);
+    if (size < 0) {
+      if (errno == EAGAIN || errno == EINTR) continue;
+      throw std::system_error(errno, std::generic_category(), "receiving a CAN frame");
+    }
+    if (size == 0) throw std::system_error(ENODEV, std::generic_category(), "receiving a CAN frame");
+    // The comparison also drops extended, remote and error frames: their flags are part of the id.
+    if (size != sizeof frame || frame.can_id != co::sdo_answer_id + unsigned{node_} ||
+        frame.can_dlc != payload.size()) {
+      continue;
+    }
+    std::copy_n(frame.data, payload.size(), payload.begin());
+    return true;
+  }
+}
+
+void SdoClient::drain() {
+  Payload stale;
+  while (receive(stale, steady_clock::now())) {
+  }
+}
+
+void SdoClient::abort(ObjectAddress object, std::uint32_t code) {
+  Payload frame{};
+  frame[0] = aborted;
+  address(frame, object);
+  store_u32(frame.data() + 4, code);
+  send(frame, steady_clock::now() + timeout_);
+  throw SdoAbort(object, code, false);
+}
+
+SdoClient::Payload SdoClient::exchange(const Payload& request, ObjectAddress object, bool first) {
+  const auto end = steady_clock::now() + timeout_;
+  send(request, end);
+  Payload answer;
+  for (;;) {
+    if (!receive(answer, end)) {
+      try {
+        abort(object, co::abort::timeout);
+      } catch (const SdoAbort&) {
+        throw SdoTimeout(fmt::format("no answer about {}", object.text()));
+      }
+    }
+    const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
+    if (answer[0] == aborted) {
+      // Late news of a transfer that was given up is not about this one.
+      if (!same_object) continue;
+      throw SdoAbort(object, load_u32(answer.data() + 4), true);
+    }
+    if (first && !same_object) continue;
+    return answer;
+  }
+}
+
+void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress) {
+  drain();
+  Payload frame{};
+  address(frame, object);
+  const bool short_one = !data.empty() && data.size() <= in_expedited;
+  if (short_one) {
+    const auto unused = static_cast<unsigned>(in_expedited - data.size());
+    frame[0] = static_cast<std::uint8_t>(download_initiate | (unused << 2U) | expedited | size_indicated);
+    std::copy(data.begin(), data.end(), frame.begin() + 4);
+  } else {
+    frame[0] = download_initiate | size_indicated;
+    store_u32(frame.data() + 4, static_cast<std::uint32_t>(data.size()));
+  }
+  const Payload initiated = exchange(frame, object, true);
+  if ((initiated[0] & specifier_mask) != download_initiated) abort(object, co::abort::command);
+  if (short_one) return;
+
+  unsigned toggle = 0;
+  std::size_t at = 0;
+  do {
+    const std::size_t size = std::min(in_segment, data.size() - at);
+    const bool last = at + size == data.size();
+    frame = {};
+    frame[0] = static_cast<std::uint8_t>(download_segment | toggle |
+                                         static_cast<unsigned>((in_segment - size) << 1U) |
+                                         (last ? last_segment : 0U));
+    std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), size, frame.begin() + 1);
+    const Payload answer = exchange(frame, object, false);
+    if ((answer[0] & specifier_mask) != download_segment_taken) abort(object, co::abort::command);
+    if ((answer[0] & toggle_bit) != toggle) abort(object, co::abort::toggle);
+    toggle ^= toggle_bit;
+    at += size;
+    if (progress) progress(at, data.size());
+  } while (at != data.size());
+}
+
+std::vector<std::uint8_t> SdoClient::upload(ObjectAddress object, const Progress& progress) {
+  drain();
+  Payload frame{};
+  frame[0] = upload_initiate;
+  address(frame, object);
+  const Payload initiated = exchange(frame, object, true);
+  if ((initiated[0] & specifier_mask) != upload_initiated) abort(object, co::abort::command);
+  const bool sized = (initiated[0] & size_indicated) != 0;
+  if ((initiated[0] & expedited) != 0) {
+    const std::size_t unused = sized ? (initiated[0] >> 2U) & 3U : 0U;
+    return {initiated.begin() + 4, initiated.end() - static_cast<std::ptrdiff_t>(unused)};
+  }
+  return upload_segments(object, load_u32(initiated.data() + 4), sized, progress);
+}
+
+std::vector<std::uint8_t> SdoClient::upload_segments(ObjectAddress object, std::size_t announced,
+                                                     bool is_announced, const Progress& progress) {
+  std::vector<std::uint8_t> out;
+  const std::size_t most = is_announced ? std::min(announced, longest) : longest;
+  unsigned toggle = 0;
+  for (bool last = false; !last;) {
+    Payload frame{};
+    frame[0] = static_cast<std::uint8_t>(upload_segment | toggle);
+    const Payload answer = exchange(frame, object, false);
+    if ((answer[0] & specifier_mask) != upload_segment_given) abort(object, co::abort::command);
+    if ((answer[0] & toggle_bit) != toggle) abort(object, co::abort::toggle);
+    const std::size_t size = in_segment - ((answer[0] >> 1U) & 7U);
+    out.insert(out.end(), answer.begin() + 1, answer.begin() + 1 + static_cast<std::ptrdiff_t>(size));
+    last = (answer[0] & last_segment) != 0;
+    toggle ^= toggle_bit;
+    if (out.size() > most) abort(object, co::abort::too_long);
+    if (progress) progress(out.size(), is_announced ? announced : out.size());
+  }
+  if (is_announced && out.size() != announced) {
+    // The server has ended the transfer: there is nothing left to abort.
+    throw SdoAbort(object, co::abort::too_short, false);
+  }
+  return out;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,75 @@
+/// \file
+/// Client of a CANopen SDO channel (CiA 301, 7.2.4): expedited and segmented transfers over a CAN socket.
+#ifndef FLEXCOMP_HOST_BUS_SDO_CLIENT_HPP
+#define FLEXCOMP_HOST_BUS_SDO_CLIENT_HPP
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace flexcomp::host {
+
+struct ObjectAddress {
+  std::uint16_t index = 0;
+  std::uint8_t sub = 0;
+
+  std::string text() const;  ///< 0x1018:1
+};
+
+/// The server ended a transfer, or this client did because the answer made no sense.
+class SdoAbort : public std::runtime_error {
+ public:
+  SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server);
+  std::uint32_t code() const { return code_; }
+  bool by_server() const { return by_server_; }
+
+ private:
+  std::uint32_t code_;
+  bool by_server_;
+};
+
+class SdoTimeout : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What an abort code says (CiA 301, table 22): "0604 0043: general parameter incompatibility".
+std::string abort_text(std::uint32_t code);
+
+class SdoClient {
+ public:
+  using Progress = std::function<void(std::size_t done, std::size_t total)>;
+
+  /// `socket` gives and takes one struct can_frame per read and write; it stays the caller's. `timeout` holds for each
+  /// answer of the server.
+  SdoClient(int socket, std::uint8_t node, std::chrono::milliseconds timeout);
+
+  /// \throws SdoAbort, SdoTimeout, std::system_error
+  std::vector<std::uint8_t> upload(ObjectAddress object, const Progress& progress = {});
+  void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {});
+
+ private:
+  using Payload = std::array<std::uint8_t, 8>;
+
+  std::vector<std::uint8_t> upload_segments(ObjectAddress object, std::size_t announced, bool is_announced,
+                                            const Progress& progress);
+  Payload exchange(const Payload& request, ObjectAddress object, bool first);
+  void send(const Payload& payload, std::chrono::steady_clock::time_point end);
+  bool receive(Payload& payload, std::chrono::steady_clock::time_point end);
+  void drain();
+  [[noreturn]] void abort(ObjectAddress object, std::uint32_t code);
+
+  int socket_;
+  std::uint8_t node_;
+  std::chrono::milliseconds timeout_;
+};
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,191 @@
+#include "bus/transfer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <set>
+#include <system_error>
+
+#include "files/input_error.hpp"
+#include "files/yaml_field.hpp"
+#include "flexcomp/image.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+/// What an image asks of a controller.
+struct Demands {
+  std::set<unsigned> bases;
+  std::size_t moving_terms = 0;  ///< constant ones are folded and cost nothing
+  std::size_t tables = 0;
+  std::size_t values = 0;
+
+  Refusal table(const Table& t, const std::uint8_t*) {
+    ++tables;
+    values += t.size;
+    return Refusal::none;
+  }
+  Refusal term(const Term<double>& t) {
+    bases.insert(static_cast<unsigned>(t.basis));
+    if (!is_constant(t)) ++moving_terms;
+    return Refusal::none;
+  }
+};
+
+std::string short_hex(const Sha256Digest& digest) { return hex(digest).substr(0, 12) + "…"; }
+
+}  // namespace
+
+std::vector<std::string> beyond_capability(const wire::Capability& capability,
+                                           std::span<const std::uint8_t> image) {
+  std::vector<std::string> out;
+  ImageHeader header;
+  Demands asks;
+  Refusal refusal = read_header(image.data(), image.size(), header);
+  if (refusal == Refusal::none) refusal = visit_image<double>(image.data(), image.size(), asks);
+  if (refusal != Refusal::none) return {text(refusal)};
+  if (capability.schema >> 8U != header.schema_major) {
+    out.push_back(fmt::format("the image has schema {}.{}, the controller knows {}.x", header.schema_major,
+                              header.schema_minor, capability.schema >> 8U));
+  }
+  for (const unsigned basis : asks.bases) {
+    if (basis >= 32 || (capability.bases >> basis & 1U) == 0) {
+      out.push_back(fmt::format("basis {} is not known to the controller", basis));
+    }
+  }
+  const auto room = [&out](std::size_t needed, std::size_t there, const char* what) {
+    if (needed > there)
+      out.push_back(fmt::format("{} {} are needed, the controller holds {}", needed, what, there));
+  };
+  room(asks.moving_terms, capability.terms, "terms that are not constant");
+  room(asks.tables, capability.tables, "tables");
+  room(asks.values, capability.values, "table values");
+  room(image.size(), capability.image_bytes, "bytes");
+  return out;
+}
+
+std::uint32_t next_sequence(ControllerClient& client) {
+  const wire::Status now = client.status();
+  const std::uint32_t newest = std::max(now.active_sequence, now.previous_sequence);
+  if (newest == std::numeric_limits<std::uint32_t>::max()) {
+    throw BusError(fmt::format("{}: the active set has the highest sequence there is", client.where()));
+  }
+  return newest + 1;
+}
+
+void push_image(ControllerClient& client, std::span<const std::uint8_t> image, const PushOptions& options) {
+  try {
+    client.stage(image, options.progress);
+    client.run(wire::Command::verify);
+    if (options.trial_cycles) {
+      client.run(wire::Command::commit_trial, *options.trial_cycles);
+    } else {
+      client.run(wire::Command::commit);
+    }
+  } catch (const RefusedByController& e) {
+    // What is staged belongs to somebody else where the controller is busy.
+    if (e.answer() != wire::Answer::busy) {
+      try {
+        client.run(wire::Command::abort);
+      } catch (const BusError&) {
+        // The first error is the one to tell; the controller drops what is staged by itself after a while.
+      }
+    }
+    throw;
+  }
+  const Bytes back = client.active_image(options.progress);
+  if (back.size() != image.size()) {
+    throw BusError(fmt::format("{}: the active set has {} bytes after the commit, {} were sent",
+                               client.where(), back.size(), image.size()));
+  }
+  const auto [there, sent] = std::mismatch(back.begin(), back.end(), image.begin());
+  if (there != back.end()) {
+    throw BusError(
+        fmt::format("{}: byte {} of the active set is 0x{:02X} after the commit, 0x{:02X} was sent",
+                    client.where(), there - back.begin(), *there, *sent));
+  }
+}
+
+RobotFile robot_of(ControllerClient& client, const std::string& robot_path) {
+  if (robot_path.empty()) {
+    std::optional<RobotFile> told = client.robot();
+    if (!told) {
+      throw BusError(
+          fmt::format("{}: this controller does not tell which robot it is for: give its file with --robot",
+                      client.where()));
+    }
+    return *std::move(told);
+  }
+  RobotFile robot = load_robot(robot_path);
+  const wire::Capability& there = client.capability();
+  if (robot.nominal.name_hash != there.name_hash) {
+    throw BusError(fmt::format("{}: the controller is for another robot than '{}' ({})", client.where(),
+                               robot.name, robot.path));
+  }
+  if (nominal_hash(robot.nominal) != there.nominal_hash) {
+    throw BusError(fmt::format("{}: the controller's nominal geometry is {}, that of {} is {}",
+                               client.where(), short_hex(there.nominal_hash), robot.path,
+                               short_hex(nominal_hash(robot.nominal))));
+  }
+  return robot;
+}
+
+Calibration load_calibration_for(ControllerClient& client, const std::string& path, const RobotFile& robot) {
+  const wire::Capability& there = client.capability();
+  const YamlField root = YamlField::load(path);
+  RobotFile known = robot;
+  if (const auto field = root.find("robot")) {
+    const std::string name = field->text();
+    if (name_hash(name.data(), name.size()) != there.name_hash) {
+      throw BusError(fmt::format("{}: {} is for another robot ('{}') than the controller{}; nothing was sent",
+                                 client.where(), path, name,
+                                 robot.name.empty() ? "" : fmt::format(" ('{}')", robot.name)));
+    }
+    known.name = name;
+  }
+  if (const auto field = root.find("nominal_hash")) {
+    const std::string hash = field->text();
+    if (hash.size() == 64 && hash != hex(there.nominal_hash)) {
+      throw BusError(
+          fmt::format("{}: {} is for another nominal geometry ({}…) than the controller's ({}); nothing was "
+                      "sent",
+                      client.where(), path, hash.substr(0, 12), short_hex(there.nominal_hash)));
+    }
+  }
+  return load_calibration(path, known);
+}
+
+Bytes pull_image(ControllerClient& client, const Progress& progress) {
+  Bytes image = client.active_image(progress);
+  if (image.empty()) {
+    throw BusError(
+        fmt::format("{}: the controller has no active set, it passes commands through", client.where()));
+  }
+  const wire::Capability& there = client.capability();
+  ImageHeader header;
+  const Refusal refusal =
+      check_image(image.data(), image.size(), there.nominal_hash, there.name_hash, header);
+  if (refusal != Refusal::none) {
+    throw BusError(fmt::format("{}: what was read is not the active set: {}", client.where(), text(refusal)));
+  }
+  return image;
+}
+
+std::optional<Bytes> read_image_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw InputError(path, 0, "", "a calibration file or a parameter image",
+                     std::generic_category().message(errno));
+  }
+  Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  constexpr std::string_view magic = "FLXC";
+  if (bytes.size() < magic.size() || !std::equal(magic.begin(), magic.end(), bytes.begin()))
+    return std::nullopt;
+  return bytes;
+}
+
+}  // namespace flexcomp::host
