@@ -4,9 +4,10 @@
 ///
 ///     index  sub  type            access  what
 ///     0x1000   0  UNSIGNED32      const   device type: 0, no standard profile
-///     0x1001   0  UNSIGNED8       ro      error register: bit 0 where a fault bit of the status record is
-///     set 0x1008   0  VISIBLE_STRING  const   manufacturer device name, "flexcomp" 0x100A   0 VISIBLE_STRING
-///     const   manufacturer software version 0x1010   0  UNSIGNED8       const   1
+///     0x1001   0  UNSIGNED8       ro      error register: bit 0 where the status record shows a fault
+///     0x1008   0  VISIBLE_STRING  const   manufacturer device name, "flexcomp"
+///     0x100A   0  VISIBLE_STRING  const   manufacturer software version
+///     0x1010   0  UNSIGNED8       const   1
 ///              1  UNSIGNED32      rw      "save" (0x65766173): commit what is staged; reads 1
 ///     0x1011   0  UNSIGNED8       const   1
 ///              1  UNSIGNED32      rw      "load" (0x64616F6C): restore_defaults; reads 1
@@ -35,8 +36,7 @@
 ///              2  DOMAIN          ro      active image, byte for byte
 ///     0x2011   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      argument of the next command
-///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads back the last
-///              one
+///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads the last one
 ///     0x2020   0  UNSIGNED8       const   2
 ///              1  DOMAIN          rw      probe request record; its download answers it
 ///              2  DOMAIN          ro      probe response record
@@ -44,17 +44,14 @@
 ///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
 ///              7  REAL32          ro      largest correction of any joint since the start, deg
 ///
-/// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length,
-/// otherwise the
-///   length is known at the end. It goes to staging only; an aborted or timed-out transfer leaves nothing
+/// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length, otherwise
+///   the length is known at the end. It goes to staging only; an aborted or timed-out transfer leaves nothing
 ///   behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
 /// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by the fade-in,
-/// because
-///   between the two a controller would run a set that it can no longer read back.
+///   because between the two a controller would run a set that it can no longer read back.
 /// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
-/// with
-///   0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).
+///   with 0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).
 #ifndef FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 #define FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 

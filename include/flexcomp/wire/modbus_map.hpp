@@ -12,32 +12,28 @@
 ///     0x0200         2    rw      reading offset in bytes, u32, high word first
 ///     0x0202       123    r       reading window: bytes of the active image from that offset
 ///     0x0300       108    rw      probe request record
-///     0x036C         1    rw      probe trigger: writing 1 answers the request, 2 answers q with the default
-///     context 0x0380        36    r       probe response record 0x0400        14    r       floats for
-///     people, binary32 "ABCD": correction of joints 1 … 6 in the last control
-///                                 cycle (deg), then the largest correction of any joint since the start
-///                                 (deg)
+///     0x036C         1    rw      probe trigger: writing 1 answers the request, 2 answers its joint command
+///                                 with the robot's default context
+///     0x0380        36    r       probe response record
+///     0x0400        14    r       floats for people, binary32 "ABCD": correction of joints 1 … 6 in the
+///                                 last control cycle, then the largest of any joint since the start (deg)
+///     0x0500       288    r       robot record (robot_record.hpp)
 ///
 /// - All of it is read by function 03 and by 04 alike, written by 06, 16 and 23. What lies between the blocks
-/// does
-///   not exist (exception 02), a write to what is only read is exception 02 as well.
+///   does not exist (exception 02), a write to what is only read is exception 02 as well.
 /// - A register of a window holds two bytes of the image, the first one in its high byte: a dump of the PDU
-/// shows the
-///   image in order, so word order never matters. Register k of a window is byte offset + 2 k.
+///   shows the image in order, so word order never matters. Register k of a window is byte offset + 2 k.
 /// - Staging: the bytes may be sent again (a lost answer), but leave no gap and never exceed the announced
-/// length; of
-///   an odd length the last low byte is padding. Offset and bytes fit in one request of function 16 (123
-///   registers, 242 bytes of the image). The offset does not advance by itself.
+///   length; of an odd length the last low byte is padding. Offset and bytes fit in one request of function
+///   16 (123 registers, 242 bytes of the image). The offset does not advance by itself.
 /// - Reading beyond the active image is exception 02. One request of function 23 writes the offset and reads
-/// up to
-///   123 registers. The set may change between two requests: compare the status record before and after.
+///   up to 123 registers. The set may change between two requests: compare the status before and after.
 /// - Argument and command in one request of function 16 (three registers from 0x00A0) run the command.
 /// - One request of function 23 writes probe request and trigger (109 registers) and reads the response.
 /// - An application refuses with exception 04, or 06 where it is busy; `answer`, `refusal` and `detail` in
-/// the status
-///   record say why. Two TCP connections have each their own offsets, argument and probe.
-/// - TCP: units 0, 255 and the configured one are this device. RTU: unit 0 is broadcast, carried out, never
-/// answered.
+///   the status record say why. Two TCP connections have each their own offsets, argument and probe.
+/// - TCP: units 0, 255 and the configured one are this device, other units get no answer. RTU: unit 0 is
+///   broadcast, carried out and never answered.
 #ifndef FLEXCOMP_WIRE_MODBUS_MAP_HPP
 #define FLEXCOMP_WIRE_MODBUS_MAP_HPP
 

@@ -28,6 +28,7 @@
 ///     104 f64 plausible position change, m         48 u32 x 6 control cycles by StepStatus 0 … 5 (wrap)
 ///     112 f64 plausible orientation change, rad    72 u16 StepStatus of the last control cycle
 ///     120 f64 largest correction of a joint, rad   74 22 bytes 0, reserved
+///
 ///     probe request, 216 bytes                    probe response, 72 bytes
 ///       0 f64 x 6 joint command, rad                0 f64 x 6 corrected joint command, rad
 ///      48 f64 payload mass, kg                     48 f64 position that is still missed, m
@@ -38,8 +39,7 @@
 ///     120 f64 x 6 direction of joint (+1, -1, 0)
 ///     168 f64 x 6 relative speed of joint
 ///
-/// Where the probe's status is `no_set` or `refused` the command
-/// comes back unchanged and both residuals are 0.
+/// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are 0.
 ///
 /// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). Commands
 /// that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
