@@ -1,0 +1,38 @@
+/// \file
+/// A bar on the terminal for what takes longer than a second.
+#ifndef FLEXCOMP_HOST_BUS_PROGRESS_BAR_HPP
+#define FLEXCOMP_HOST_BUS_PROGRESS_BAR_HPP
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <string>
+
+namespace flexcomp::host {
+
+/// Draws on standard error if that is a terminal, and takes itself away at the end.
+class ProgressBar {
+ public:
+  ProgressBar(std::string what, bool quiet);
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void show(std::size_t done, std::size_t total);
+
+  /// For functions that report their progress; valid as long as the bar.
+  std::function<void(std::size_t, std::size_t)> callback() {
+    return [this](std::size_t done, std::size_t total) { show(done, total); };
+  }
+
+ private:
+  std::string what_;
+  bool active_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point start_;
+  std::chrono::steady_clock::time_point next_;
+};
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,125 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "bus/progress_bar.hpp"
+#include "bus/transfer.hpp"
+#include "commands/bus_options.hpp"
+#include "files/calibration_file.hpp"
+#include "files/image.hpp"
+#include "files/write_file.hpp"
+#include "flexcomp/bytes.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+struct Push {
+  BusOptions bus;
+  std::string set;
+  std::string robot;
+  std::string image;
+  std::optional<std::uint32_t> sequence;
+  std::optional<double> trial_s;
+  bool confirm = false;
+  bool allow_unnamed = false;
+
+  void run() const;
+  Bytes make(ControllerClient& client) const;
+};
+
+Bytes Push::make(ControllerClient& client) const {
+  const RobotFile for_robot = robot_of(client, robot);
+  const Calibration calibration = load_calibration_for(client, set, for_robot);
+  ImageOptions options;
+  options.allow_unnamed = allow_unnamed;
+  Bytes out = make_image(calibration, for_robot, sequence ? *sequence : next_sequence(client), options);
+  const std::vector<std::string> beyond = beyond_capability(client.capability(), out);
+  if (!beyond.empty()) {
+    throw BusError(fmt::format("{}: {} is more than this controller can do: {}; nothing was sent",
+                               client.where(), set, fmt::join(beyond, "; ")));
+  }
+  return out;
+}
+
+void Push::run() const {
+  const auto start = std::chrono::steady_clock::now();
+  if (set.empty() != confirm)
+    throw CLI::ValidationError("CAL.yaml", "give either a set to push or --confirm");
+  // A file that cannot be read is said before anybody is asked.
+  const std::optional<Bytes> ready = confirm ? std::nullopt : read_image_file(set);
+  const std::unique_ptr<ControllerClient> client = bus.connect();
+  nlohmann::ordered_json result{{"bus", client->where()}};
+  if (confirm) {
+    client->run(wire::Command::confirm);
+    const std::uint32_t active = client->status().active_sequence;
+    result["sequence"] = active;
+    bus.say(fmt::format("{}: set {} is confirmed", client->where(), active));
+    bus.write_json(result);
+    return;
+  }
+
+  const Bytes bytes = ready ? *ready : make(*client);
+  if (!image.empty()) {
+    write_file(image, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  }
+  PushOptions options;
+  if (trial_s) {
+    const double cycles =
+        std::ceil(*trial_s * 1e6 / std::max<std::uint32_t>(client->capability().cycle_us, 1));
+    if (cycles > std::numeric_limits<std::uint32_t>::max()) {
+      throw CLI::ValidationError("--trial", "so long a trial cannot be counted");
+    }
+    options.trial_cycles = static_cast<std::uint32_t>(cycles);
+  }
+  {
+    ProgressBar bar("pushing", bus.quiet);
+    options.progress = bar.callback();
+    push_image(*client, bytes, options);
+  }
+  const wire::Status now = client->status();
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  result["sequence"] = now.active_sequence;
+  result["bytes"] = bytes.size();
+  result["crc"] = fmt::format("{:08x}", now.active_crc);
+  result["trial"] = trial_s.has_value();
+  result["seconds"] = took.count();
+  bus.say(fmt::format("{}: set {} is active{}: {} bytes, read back and equal, {:.2f} s", client->where(),
+                      now.active_sequence,
+                      trial_s ? fmt::format(" on trial (confirm within {:.1f} s: push --to {} --confirm)",
+                                            *trial_s, client->where())
+                              : "",
+                      bytes.size(), took.count()));
+  bus.write_json(result);
+}
+
+}  // namespace
+
+void add_push(CLI::App& app) {
+  auto state = std::make_shared<Push>();
+  CLI::App* command = app.add_subcommand("push", "send a calibration to a controller");
+  state->bus.add_to(*command, "--to");
+  command->add_option("set", state->set, "calibration file, or a parameter image as pull --image writes it")
+      ->type_name("CAL.yaml");
+  command
+      ->add_option("--robot", state->robot, "robot file; by default the controller tells which arm it is for")
+      ->type_name("R.yaml");
+  command->add_option("--sequence", state->sequence,
+                      "number of the set; by default one more than the newest there");
+  command->add_option("--image", state->image, "write the bytes that are sent to this file")
+      ->type_name("FILE");
+  command
+      ->add_option("--trial", state->trial_s,
+                   "on trial: the set before comes back unless confirmed within so many s")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--confirm", state->confirm, "keep the set that runs on trial");
+  command->add_flag("--allow-unnamed", state->allow_unnamed, "push what was found but not understood, too");
+  command->callback([state] { state->run(); });
+}
+
+}  // namespace flexcomp::host
