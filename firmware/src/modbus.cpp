@@ -500,7 +500,7 @@ bool ModbusTcp::receive(const std::uint8_t* bytes, std::size_t size) {
     const std::uint8_t unit = frame_[6];
     if (unit != unit_ && unit != 0 && unit != 255) continue;
     std::uint8_t out[wire::modbus::tcp_bytes];
-    const std::size_t n = server_.answer(frame_.data() + header, length - 1, out + header);
+    const std::size_t n = server_->answer(frame_.data() + header, length - 1, out + header);
     std::memcpy(out, frame_.data(), 4);
     put16(out + 4, static_cast<std::uint32_t>(n + 1));
     out[6] = unit;

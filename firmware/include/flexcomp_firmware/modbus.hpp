@@ -93,14 +93,14 @@ class ModbusRtu {
 class ModbusTcp {
  public:
   ModbusTcp(ModbusServer& server, std::uint8_t unit, const Transmit& transmit)
-      : server_(server), unit_(unit), transmit_(transmit) {}
+      : server_(&server), unit_(unit), transmit_(transmit) {}
 
   /// Bytes from the stream, in any portions. False where the stream is not Modbus (protocol identifier not 0, or a
   /// length that no PDU has): the connection must be closed, there is no way to find the next frame.
   bool receive(const std::uint8_t* bytes, std::size_t size);
 
  private:
-  ModbusServer& server_;
+  ModbusServer* server_;
   std::uint8_t unit_;
   Transmit transmit_;
   std::size_t size_ = 0;
