@@ -1,0 +1,2 @@
+// The library itself is what is looked at, by the link-time rules; see CMakeLists.txt.
+int main() { return 0; }
