@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "flexcomp/bytes.hpp"
+#include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -101,7 +102,7 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
     FirmwareContext tracked = context;
     tracked.direction = direction_;
     const Compensated<Scalar, joints> compensated =
-        compensate(sets_.models[index], q_command_rad, tracked, settings_.compensation);
+        corrected_command(sets_.models[index], q_command_rad, tracked, settings_.compensation);
     out.q = compensated.q;
     out.status = compensated.status;
     if (out.status != StepStatus::refused) {

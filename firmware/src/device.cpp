@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "flexcomp/compensate.hpp"
 #include "flexcomp/image.hpp"
+#include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -75,10 +75,10 @@ wire::ProbeResponse Device::probe(const wire::ProbeRequest& request) const {
     return out;
   }
   const Compensated<Scalar, joints> compensated =
-      compensate(*model, q, context, cycle_.settings().compensation);
+      corrected_command(*model, q, context, cycle_.settings().compensation);
   out.status = static_cast<std::uint16_t>(compensated.status);
   if (compensated.status == StepStatus::refused) return out;
-  const TargetResidual<Scalar> residual = target_residual(*model, compensated.q, q, context);
+  const Miss residual = missed(*model, compensated.q, q, context);
   for (std::size_t j = 0; j < joints; ++j) out.q_rad[j] = to_binary64_bits(compensated.q[j]);
   out.position_m = to_binary64_bits(residual.position_m);
   out.orientation_rad = to_binary64_bits(residual.orientation_rad);

@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "flexcomp/compensate.hpp"
 #include "flexcomp/crc32.hpp"
+#include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -189,19 +189,12 @@ bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
       context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
       context.relative_speed[j] = context.direction[j];
     }
-    const TargetResidual<Scalar> change = target_residual(model, q, q, context);
+    const Miss change = missed(model, q, q, context);
     if (!(change.position_m <= settings_.plausible_position_m)) {
       detail = micro(change.position_m);
       return false;
     }
-    // The residual is the sine of the angle: beyond a right angle it gets smaller again.
-    Workspace<Scalar, joints> workspace;
-    const Pose<Scalar> nominal = nominal_forward(model, q);
-    const Pose<Scalar> flexible = forward(model, q, context, workspace);
-    const Scalar trace = dot<Scalar>(nominal.rotation.col(0), flexible.rotation.col(0)) +
-                         dot<Scalar>(nominal.rotation.col(1), flexible.rotation.col(1)) +
-                         dot<Scalar>(nominal.rotation.col(2), flexible.rotation.col(2));
-    if (!(change.orientation_rad <= settings_.plausible_orientation_rad && trace > Scalar(1))) {
+    if (change.beyond_a_right_angle || !(change.orientation_rad <= settings_.plausible_orientation_rad)) {
       detail = micro(change.orientation_rad);
       return false;
     }
