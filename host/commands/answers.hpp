@@ -1,0 +1,33 @@
+/// \file
+/// What is answered to targets, by the host (compensate) or by the controller (probe): one file format for both.
+#ifndef FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP
+#define FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP
+
+#include <array>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "files/data_file.hpp"
+#include "flexcomp/status.hpp"
+
+namespace flexcomp::host {
+
+struct Answer {
+  std::array<double, joint_count> q_rad{};  ///< corrected command
+  double residual_m = 0;                    ///< what the flexible model still misses of the target
+  double residual_rad = 0;
+  StepStatus status = StepStatus::no_set;
+};
+
+/// Columns q1_deg … q6_deg, residual_mm, residual_deg, status, and those that were passed through.
+std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& answers);
+
+/// Numbers over all answers: counts by status, largest correction, mean and largest residual. `commands` are the joint
+/// commands that were answered.
+nlohmann::ordered_json answers_summary(const std::vector<std::array<double, joint_count>>& commands,
+                                       const std::vector<Answer>& answers);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,44 @@
+#include "commands/common_options.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "files/write_file.hpp"
+
+namespace flexcomp::host {
+
+void CommonOptions::add_to(CLI::App& app) {
+  app.add_option("--json", json, "Write the machine-readable result to FILE")->type_name("FILE");
+  app.add_flag("--quiet", quiet, "No text on standard output");
+}
+
+void CommonOptions::add_seed_to(CLI::App& app) {
+  app.add_option("--seed", seed, "Seed of the random numbers; the same seed gives the same file")
+      ->capture_default_str();
+}
+
+void CommonOptions::say(const std::string& text) const {
+  if (!quiet) fmt::print("{}\n", text);
+}
+
+void CommonOptions::warn(const std::vector<std::string>& warnings) const {
+  for (const std::string& w : warnings) fmt::print(stderr, "warning: {}\n", w);
+}
+
+void CommonOptions::write_json(const nlohmann::ordered_json& result) const {
+  if (!json.empty()) write_file(json, result.dump(2) + "\n");
+}
+
+void add_robot_option(CLI::App& app, std::string& path) {
+  app.add_option("--robot", path, "Robot file (nominal geometry, limits, tool, payload)")
+      ->type_name("ROBOT.yaml")
+      ->required();
+}
+
+void add_force_option(CLI::App& app, bool& force) {
+  app.add_flag("--force", force, "Go on where input is only suspicious (readings that look like radians)");
+}
+
+}  // namespace flexcomp::host

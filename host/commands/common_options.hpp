@@ -1,0 +1,37 @@
+/// \file
+/// Options that every command has, and the two ways in which a command speaks: text for people, JSON for machines.
+#ifndef FLEXCOMP_HOST_COMMANDS_COMMON_OPTIONS_HPP
+#define FLEXCOMP_HOST_COMMANDS_COMMON_OPTIONS_HPP
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace flexcomp::host {
+
+struct CommonOptions {
+  std::string json;
+  bool quiet = false;
+  std::uint64_t seed = 1;
+
+  void add_to(CLI::App& app);       ///< --json, --quiet
+  void add_seed_to(CLI::App& app);  ///< --seed, wherever randomness is used
+
+  /// A line for people on standard output, unless quiet.
+  void say(const std::string& text) const;
+  /// Warnings go to standard error, also when quiet: they say that something may be wrong.
+  void warn(const std::vector<std::string>& warnings) const;
+  /// The result as a file, where one is asked for.
+  void write_json(const nlohmann::ordered_json& result) const;
+};
+
+/// --robot, required.
+void add_robot_option(CLI::App& app, std::string& path);
+/// --force: go on where input is only suspicious.
+void add_force_option(CLI::App& app, bool& force);
+
+}  // namespace flexcomp::host
+
+#endif

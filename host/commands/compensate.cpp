@@ -1,0 +1,99 @@
+#include "flexcomp/compensate.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands/answers.hpp"
+#include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/image.hpp"
+#include "files/input_error.hpp"
+#include "files/write_file.hpp"
+#include "flexcomp/image.hpp"
+#include "kinematics/nominal_inverse.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+struct Compensate {
+  CommonOptions common;
+  std::string robot;
+  std::string calibration;
+  std::string targets;
+  std::string out;
+  bool allow_unnamed = false;
+  bool force = false;
+
+  void run() const;
+};
+
+void Compensate::run() const {
+  const RobotFile robot_file = load_robot(robot);
+  const Calibration set = load_calibration(calibration, robot_file);
+  const TargetsFile list = load_targets(targets, robot_file, {force});
+  common.warn(list.warnings);
+
+  // Through the image and a model of the controller's size: what is answered here is what the controller answers.
+  const std::vector<std::uint8_t> image =
+      make_image(set, robot_file, set.sequence.value_or(0), {.allow_unnamed = allow_unnamed});
+  const auto model = std::make_unique<Model<double, joint_count>>();
+  const Refusal refusal = model_from_image(image.data(), image.size(), robot_file.nominal, *model);
+  if (refusal != Refusal::none)
+    throw InputError(calibration, 0, "", "a set that a controller can hold", text(refusal));
+
+  const auto commands = joint_commands(list, robot_file);
+  std::vector<Answer> answers;
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    const auto& context = list.rows[k].context;
+    const auto result = compensate(*model, commands[k], context, CompensationSettings<double>{});
+    const auto residual = target_residual(*model, result.q, commands[k], context);
+    answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status});
+  }
+  write_file(out, answers_text(list, answers));
+  const nlohmann::ordered_json summary = answers_summary(commands, answers);
+  common.say(fmt::format(
+      "{}: {} corrected commands, {} of them ok; largest correction {:.4f} deg, largest residual {:.2g} mm",
+      out, answers.size(), summary["status"]["ok"].get<int>(),
+      summary["largest_correction_deg"].get<double>(), summary["residual_max_mm"].get<double>()));
+  common.write_json(summary);
+}
+
+}  // namespace
+
+void add_compensate(CLI::App& app) {
+  auto options = std::make_shared<Compensate>();
+  CLI::App* command = app.add_subcommand(
+      "compensate", "Corrected joint commands for targets, as the controller would give them");
+  add_robot_option(*command, options->robot);
+  command->add_option("--calibration", options->calibration, "Calibration file")
+      ->type_name("CAL.yaml")
+      ->required();
+  command
+      ->add_option(
+          "--targets", options->targets,
+          "Targets: q1_deg … q6_deg [deg], or a pose of Ftool in F0 (x_mm y_mm z_mm qw qx qy qz) with "
+          "seed1_deg … seed6_deg; context columns as in data files")
+      ->type_name("T.csv")
+      ->required();
+  command
+      ->add_option(
+          "-o,--output", options->out,
+          "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status (ok "
+          "near_singular limited at_limit no_set refused)")
+      ->type_name("OUT.csv")
+      ->required();
+  command->add_flag("--allow-unnamed", options->allow_unnamed, "Also use what was found but not understood");
+  add_force_option(*command, options->force);
+  options->common.add_to(*command);
+  command->footer(
+      "Example:\n  flexcomp compensate --robot tx60l.yaml --calibration cal.yaml --targets t.csv -o "
+      "corrected.csv");
+  command->callback([options] { options->run(); });
+}
+
+}  // namespace flexcomp::host

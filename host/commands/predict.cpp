@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/quaternion.hpp"
+#include "kinematics/measured_pose.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+struct Predict {
+  CommonOptions common;
+  std::string robot;
+  std::string calibration;
+  std::string joints;
+  std::string out;
+  bool force = false;
+
+  void run() const;
+};
+
+void Predict::run() const {
+  const RobotFile robot_file = load_robot(robot);
+  Calibration set;  // without a calibration: the nominal arm
+  if (!calibration.empty()) set = load_calibration(calibration, robot_file);
+  DataFile data = load_joints(joints, robot_file, {force});
+  common.warn(data.warnings);
+  const auto model = prepare(set.terms, robot_file, set.path);
+  data.kind = MeasurementKind::pose;
+  data.reflectors = 0;
+  data.columns.position_sigma = data.columns.orientation_sigma = false;  // nothing was measured
+  for (Measurement& row : data.rows) {
+    const Pose<double> pose = measured_pose(*model, set, row.q_rad, row.context);
+    row.position_m = pose.position;
+    row.orientation = unit_quaternion(pose.rotation);
+  }
+  save_data(out, data);
+  common.say(fmt::format("{}: {} poses of {} with {}{}", out, data.rows.size(), robot_file.name,
+                         calibration.empty() ? "no errors (nominal)" : calibration,
+                         set.frames ? ", in the frame of the instrument" : ""));
+  common.write_json({{"poses", data.rows.size()},
+                     {"robot", robot_file.name},
+                     {"calibration", calibration},
+                     {"frames", set.frames.has_value()},
+                     {"output", out}});
+}
+
+}  // namespace
+
+void add_predict(CLI::App& app) {
+  auto options = std::make_shared<Predict>();
+  CLI::App* command =
+      app.add_subcommand("predict", "The pose that the forward model gives for joint readings");
+  add_robot_option(*command, options->robot);
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Calibration or truth file; without it the nominal arm")
+      ->type_name("CAL.yaml|TRUTH.yaml");
+  command
+      ->add_option(
+          "--joints", options->joints,
+          "Joint readings q1_deg … q6_deg [deg] and, where it matters, context (payload_kg, temp_c, …); "
+          "a data file will do, what was measured in it is not used")
+      ->type_name("Q.csv")
+      ->required();
+  command
+      ->add_option("-o,--output", options->out,
+                   "Poses in the columns of a data file [mm, quaternion w x y z]")
+      ->type_name("P.csv")
+      ->required();
+  add_force_option(*command, options->force);
+  options->common.add_to(*command);
+  command->footer(
+      "Example:\n  flexcomp predict --robot tx60l.yaml --calibration cal.yaml --joints q.csv -o p.csv");
+  command->callback([options] { options->run(); });
+}
+
+}  // namespace flexcomp::host

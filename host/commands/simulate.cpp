@@ -1,0 +1,202 @@
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/input_error.hpp"
+#include "files/quaternion.hpp"
+#include "flexcomp/model.hpp"
+#include "kinematics/measured_pose.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+/// Standard deviations per axis (Chen et al. 2019, N1 and N2).
+struct Noise {
+  double position_m;
+  double orientation_rad;
+};
+const std::map<std::string, Noise> noise_levels{
+    {"N1", {0.035e-3, radians(0.007)}}, {"N2", {0.07e-3, radians(0.014)}}, {"none", {0, 0}}};
+
+const std::map<std::string, MeasurementKind> kinds{{"pose", MeasurementKind::pose},
+                                                   {"position", MeasurementKind::position},
+                                                   {"reflectors", MeasurementKind::reflectors}};
+
+constexpr double largest_move_rad = radians(30);
+constexpr double seconds_per_pose = 60;
+constexpr double temperature_spread_k = 8;
+
+/// To the micro-degree, as a controller displays it: files that people can read.
+double rounded_angle(double rad) { return *parse_si(fmt::format("{:.6f}", degrees(rad)), unit::degree); }
+double rounded(double value, double step) { return std::round(value / step) * step; }
+
+struct Simulate {
+  CommonOptions common;
+  std::string robot;
+  std::string truth;
+  unsigned poses = 0;
+  std::string measure = "pose";
+  std::vector<double> payloads;
+  bool context = false;
+  std::string noise = "N1";
+  std::vector<double> frame;  // x y z mm, rx ry rz deg
+  std::string out;
+
+  void run() const;
+  void random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
+                      Measurement& row) const;
+  void measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
+                Measurement& row) const;
+};
+
+/// Motion, temperature and time that do not follow each other or the pose, so that their effects can be told apart.
+void Simulate::random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
+                              Measurement& row) const {
+  std::uniform_real_distribution<double> symmetric(-1, 1);
+  double largest = 0;
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    row.move_rad[j] = rounded_angle(largest_move_rad * symmetric(random));
+    row.context.direction[j] = row.move_rad[j] > 0 ? 1 : row.move_rad[j] < 0 ? -1 : 0;
+    largest = std::max(largest, std::abs(row.move_rad[j]));
+  }
+  for (std::size_t j = 0; j < joint_count && largest > 0; ++j)
+    row.context.relative_speed[j] = row.move_rad[j] / largest;
+  row.context.temperature_c =
+      rounded(robot_file.nominal.reference_temperature_c + temperature_spread_k * symmetric(random), 0.01);
+  row.context.time_s =
+      rounded(seconds_per_pose * (static_cast<double>(k) + 0.2 * symmetric(random) + 0.2), 0.1);
+}
+
+/// What the instrument says about a true pose.
+void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
+                        Measurement& row) const {
+  const Noise& level = noise_levels.at(noise);
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&](double sigma) {
+    const double x = sigma * normal(random);
+    const double y = sigma * normal(random);
+    return Eigen::Vector3d(x, y, sigma * normal(random));
+  };
+  for (std::size_t r = 0;
+       r < robot_file.reflectors_m.size() && kinds.at(measure) == MeasurementKind::reflectors; ++r) {
+    row.reflector_m[r] =
+        pose.rotation * robot_file.reflectors_m[r] + pose.position + vector(level.position_m);
+  }
+  row.position_m = pose.position + vector(level.position_m);
+  const Eigen::Vector3d turn = vector(level.orientation_rad);
+  if (turn.norm() > 0) {
+    pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * pose.rotation;
+  }
+  row.orientation = unit_quaternion(pose.rotation);
+  row.position_sigma_m = level.position_m;
+  row.orientation_sigma_rad = level.orientation_rad;
+}
+
+void Simulate::run() const {
+  const RobotFile robot_file = load_robot(robot);
+  Calibration set = load_calibration(truth, robot_file);
+  DataFile data;
+  data.kind = kinds.at(measure);
+  if (data.kind == MeasurementKind::reflectors) {
+    data.reflectors = robot_file.reflectors_m.size();
+    if (data.reflectors == 0) {
+      throw InputError(robot, 0, "tool.reflectors_mm", "reflectors a, b, c (, d) for --measure reflectors",
+                       "nothing");
+    }
+  }
+  if (!frame.empty()) {
+    if (!set.frames) set.frames.emplace();
+    set.frames->f = Frame::of(small_pose<double>({frame[0] * 1e-3, frame[1] * 1e-3, frame[2] * 1e-3,
+                                                  radians(frame[3]), radians(frame[4]), radians(frame[5])}));
+  }
+  const bool noisy = noise != "none";
+  data.columns.payload_mass = !payloads.empty();
+  data.columns.move.fill(context);
+  data.columns.temperature = data.columns.time = context;
+  data.columns.position_sigma = noisy;
+  data.columns.orientation_sigma = noisy && data.kind == MeasurementKind::pose;
+  const auto model = prepare(set.terms, robot_file, truth);
+
+  std::mt19937_64 random(common.seed);
+  for (std::size_t k = 0; k < poses; ++k) {
+    Measurement row;
+    row.context = default_context<double>(robot_file.nominal);
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      const JointLimits& limits = robot_file.nominal.limits[j];
+      row.q_rad[j] =
+          rounded_angle(std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random));
+    }
+    if (!payloads.empty()) row.context.payload_kg = payloads[k % payloads.size()];
+    if (context) random_context(k, robot_file, random, row);
+    measured(robot_file, measured_pose(*model, set, row.q_rad, row.context), random, row);
+    data.rows.push_back(row);
+  }
+  save_data(out, data);
+  common.say(fmt::format("{}: {} random poses of {}, {} measured with noise {}, seed {}", out, poses,
+                         robot_file.name, measure, noise, common.seed));
+  common.write_json({{"poses", poses},
+                     {"robot", robot_file.name},
+                     {"measure", measure},
+                     {"noise", noise},
+                     {"seed", common.seed},
+                     {"output", out}});
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app) {
+  auto options = std::make_shared<Simulate>();
+  CLI::App* command = app.add_subcommand("simulate", "Measured data from an assumed true robot");
+  add_robot_option(*command, options->robot);
+  command->add_option("--truth", options->truth, "Truth file: the robot's errors by name")
+      ->type_name("TRUTH.yaml")
+      ->required();
+  command->add_option("--poses", options->poses, "Number of random poses, uniform within the joint limits")
+      ->check(CLI::Range(1U, 10000000U))
+      ->required();
+  command->add_option("--measure", options->measure, "What is measured: pose, position or reflectors")
+      ->check(CLI::IsMember({"pose", "position", "reflectors"}))
+      ->capture_default_str();
+  command
+      ->add_option("--payloads", options->payloads,
+                   "Payloads in turn [kg], at the robot file's centre of mass")
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("KG,KG,…");
+  command->add_flag("--context", options->context,
+                    "Also random motion before each pose [deg], temperature [deg C] and time [s]");
+  command
+      ->add_option(
+          "--noise", options->noise,
+          "N1 (0.035 mm, 0.007 deg per axis), N2 (twice that) or none; reflectors: mm per coordinate")
+      ->check(CLI::IsMember({"N1", "N2", "none"}))
+      ->capture_default_str();
+  command
+      ->add_option("--frame", options->frame,
+                   "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg]")
+      ->delimiter(',')
+      ->expected(6)
+      ->type_name("X,Y,Z,RX,RY,RZ");
+  command->add_option("-o,--output", options->out, "Data file")->type_name("D.csv")->required();
+  options->common.add_seed_to(*command);
+  options->common.add_to(*command);
+  command->footer(
+      "Example:\n  flexcomp simulate --robot tx60l.yaml --truth truth.yaml --poses 60 --payloads 0,1.108 "
+      "--noise N1 -o "
+      "data.csv");
+  command->callback([options] { options->run(); });
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,90 @@
+#include "kinematics/nominal_inverse.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "files/input_error.hpp"
+#include "flexcomp/forward.hpp"
+#include "flexcomp/identification.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr int most_steps = 200;
+constexpr double reached = 1e-11;         // m and rad; the arithmetic itself leaves 1e-15 of the reach
+constexpr double longest_step_rad = 0.3;  // longer ones leave the branch
+
+using JointVector = std::array<double, joint_count>;
+/// No term has room in it: this is the nominal arm.
+using RigidModel = Model<double, joint_count, Capacity<1, 1, 6>>;
+
+/// Rotation vector that turns `from` into `to`, in the outer frame.
+Eigen::Vector3d rotation_between(const Eigen::Matrix3d& to, const Eigen::Matrix3d& from) {
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(to * from.transpose()));
+  return turn.angle() * turn.axis();
+}
+
+/// A reading is as good a whole turn away, where the limits ask for it.
+bool fit_into_limits(const NominalRobot<joint_count>& robot, JointVector& q) {
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    const JointLimits& limits = robot.limits[j];
+    if (q[j] > limits.max_rad) q[j] -= 2 * pi * std::ceil((q[j] - limits.max_rad) / (2 * pi));
+    if (q[j] < limits.min_rad) q[j] += 2 * pi * std::ceil((limits.min_rad - q[j]) / (2 * pi));
+    if (q[j] > limits.max_rad) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<JointVector> nominal_inverse(const NominalRobot<joint_count>& robot, const Pose<double>& target,
+                                           const JointVector& seed_rad) {
+  RigidModel model;
+  model.begin(robot);
+  model.finish();
+  const auto context = default_context<double>(robot);
+  JointVector q = seed_rad;
+  for (int k = 0; k < most_steps; ++k) {
+    Linearisation<double, joint_count> at;
+    linearise(model, q, context, at);
+    Vector6<double> error;
+    error << target.position - at.pose.position, rotation_between(target.rotation, at.pose.rotation);
+    if (error.head<3>().norm() < reached && error.tail<3>().norm() < reached) {
+      if (!fit_into_limits(robot, q)) return {};
+      return q;
+    }
+    Eigen::Matrix<double, 6, 6> jacobian;
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      const Place theta{static_cast<std::uint8_t>(j + 1), slot::theta};
+      jacobian.col(static_cast<Eigen::Index>(j)) = screw(model, at, theta);
+    }
+    Vector6<double> step = jacobian.completeOrthogonalDecomposition().solve(error);
+    step *= std::min(1.0, longest_step_rad / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+    if (!step.allFinite()) return {};
+    for (std::size_t j = 0; j < joint_count; ++j) q[j] += step[static_cast<Eigen::Index>(j)];
+  }
+  return {};
+}
+
+std::vector<JointVector> joint_commands(const TargetsFile& targets, const RobotFile& robot) {
+  std::vector<JointVector> commands;
+  for (const Target& t : targets.rows) {
+    if (!targets.poses) {
+      commands.push_back(t.q_rad);
+      continue;
+    }
+    const auto q = nominal_inverse(robot.nominal, {t.orientation.toRotationMatrix(), t.position_m}, t.q_rad);
+    if (!q) {
+      throw InputError(targets.path, t.line, "x_mm … qz",
+                       "a pose that the nominal arm reaches from seed1_deg … seed6_deg within its limits",
+                       "one that it does not reach");
+    }
+    commands.push_back(*q);
+  }
+  return commands;
+}
+
+}  // namespace flexcomp::host

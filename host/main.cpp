@@ -1,0 +1,61 @@
+/// \file
+/// The command `flexcomp`: one subcommand per file of commands/, and the one place that turns what was thrown into an
+/// exit status.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "commands/commands.hpp"
+#include "errors.hpp"
+
+namespace {
+
+using namespace flexcomp::host;
+
+int status(ExitStatus s) { return static_cast<int>(s); }
+
+int give_up(ExitStatus s, const std::exception& e) {
+  fmt::print(stderr, "flexcomp: {}\n", e.what());
+  return status(s);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Rigid-flexible calibration of robot arms: from measured points to corrected joint commands in the "
+      "controller.\n"
+      "Exit status: 0 done; 2 usage; 3 input refused; 4 the bus or the device refused or did not answer; 5 "
+      "done, but the "
+      "result is not trustworthy.",
+      "flexcomp"};
+  app.set_version_flag("--version", "flexcomp " FLEXCOMP_VERSION);
+  app.require_subcommand(1);
+  add_simulate(app);
+  // add_identify(app);
+  // add_validate(app);
+  add_predict(app);
+  add_compensate(app);
+  add_push(app);
+  add_pull(app);
+  add_status(app);
+  add_rollback(app);
+  // add_probe(app);
+  try {
+    app.parse(argc, argv);
+    return status(ExitStatus::done);
+  } catch (const CLI::ParseError& e) {
+    // Asking for help or the version ends here too, with 0.
+    return app.exit(e) == 0 ? status(ExitStatus::done) : status(ExitStatus::usage);
+  } catch (const InputError& e) {
+    return give_up(ExitStatus::input_refused, e);
+  } catch (const BusError& e) {
+    return give_up(ExitStatus::bus, e);
+  } catch (const DoubtfulResult& e) {
+    return give_up(ExitStatus::not_trustworthy, e);
+  } catch (const std::exception& e) {
+    return give_up(ExitStatus::failed, e);
+  }
+}
