@@ -9,7 +9,11 @@
 ///
 /// Both dampings are zero where the arm is regular. Near a singularity lo grows first and smoothly: the first
 /// block row still holds exactly, so the arm gives up orientation before position. lp grows only where the
-/// position itself cannot be reached. The map from command to correction is continuous everywhere.
+/// position itself cannot be reached. The correction is kept in two parts: what the position needs, and what
+/// the orientation still needs without moving the tool point. Each is scaled down as a whole, never joint by
+/// joint, and the second is allowed less from one correction to the next: so the last word is the position's,
+/// also where a stretched arm could only chase its orientation for ever. The map from command to correction
+/// is continuous everywhere.
 #ifndef FLEXCOMP_COMPENSATE_HPP
 #define FLEXCOMP_COMPENSATE_HPP
 
@@ -29,7 +33,7 @@ struct CompensationSettings {
   /// sets in. An arm whose Jacobian has a smallest singular value of 0.1 (lengths in m) is never below
   /// 0.1/sqrt(3).
   S singular_below = S(0.05);
-  S damping = S(0.05);  ///< at the singularity itself
+  S damping = S(0.1);  ///< at the singularity itself
 };
 
 template <class S, std::size_t N>
@@ -75,6 +79,17 @@ struct DampedInverse {
   }
 };
 
+/// Largest magnitude in a list; NaNs are skipped.
+template <class S, std::size_t N>
+inline S greatest_of(const std::array<S, N>& v) {
+  S greatest = S(0);
+  for (const S x : v) {
+    if (x > greatest) greatest = x;
+    if (-x > greatest) greatest = -x;
+  }
+  return greatest;
+}
+
 /// The factored Jacobian of one pose; every correction of a cycle uses it (chord iteration).
 template <class S, std::size_t N>
 class Corrector {
@@ -109,20 +124,40 @@ class Corrector {
     }
     mirror(o);
     orientation_.set(o, settings);
+    if (position_.damped || orientation_.damped) gave_up_ = true;
   }
 
-  bool damped() const { return position_.damped || orientation_.damped; }
+  /// Whether any correction so far was damped or scaled down.
+  bool gave_up() const { return gave_up_; }
 
-  /// Joint correction for a position error (m) and a small orientation error (rad), both in F0.
-  std::array<S, N> solve(const Vector3<S>& position, const Vector3<S>& orientation) const {
+  /// Joint correction for a position error (m) and a small orientation error (rad), both in F0: what the
+  /// position needs, no joint more than `largest`, plus what the orientation still needs while the tool point
+  /// stays, no joint more than `largest_turn` (rad).
+  std::array<S, N> solve(const Vector3<S>& position, const Vector3<S>& orientation, S largest,
+                         S largest_turn) {
+    const Vector3<S> u = multiply(position_.inverse, position);
     const Vector3<S> v = multiply(orientation_.inverse, orientation - multiply(gain_, position));
-    const Vector3<S> u = multiply(position_.inverse, position) - transposed(gain_, v);
-    std::array<S, N> dq;
-    for (std::size_t i = 0; i < N; ++i) dq[i] = dot<S>(linear_[i], u) + dot<S>(angular_[i], v);
-    return dq;
+    const Vector3<S> w = transposed(gain_, v);
+    std::array<S, N> shift;
+    std::array<S, N> turn;
+    for (std::size_t i = 0; i < N; ++i) {
+      shift[i] = dot<S>(linear_[i], u);
+      turn[i] = dot<S>(angular_[i], v) - dot<S>(linear_[i], w);
+    }
+    if (hold_below(shift, largest)) gave_up_ = true;
+    if (hold_below(turn, largest_turn)) gave_up_ = true;
+    for (std::size_t i = 0; i < N; ++i) shift[i] += turn[i];
+    return shift;
   }
 
  private:
+  static bool hold_below(std::array<S, N>& v, S largest) {
+    const S greatest = greatest_of(v);
+    if (!(greatest > largest)) return false;
+    const S scale = largest / greatest;
+    for (S& x : v) x *= scale;
+    return true;
+  }
   static void mirror(Matrix3<S>& m) {
     m(1, 0) = m(0, 1);
     m(2, 0) = m(0, 2);
@@ -140,6 +175,7 @@ class Corrector {
   DampedInverse<S> position_;
   DampedInverse<S> orientation_;
   Matrix3<S> gain_;
+  bool gave_up_ = false;
 };
 
 /// sin(angle) * axis of the rotation that turns `from` into `to`, in the outer frame; exact to third order.
@@ -155,13 +191,31 @@ inline Vector3<S> rotation_error(const Matrix3<S>& to, const Matrix3<S>& from) {
 /// three.
 constexpr int corrections = 3;
 
+/// What one correction may turn any joint for the orientation, in parts of the largest correction. A regular
+/// pose needs far less in the second and third; a stretched arm would use all it gets.
+template <class S>
+constexpr S allowed_turn(int correction) {
+  return correction == 0 ? S(1) : correction == 1 ? S(0.2) : S(0.02);
+}
+
+template <class S, std::size_t N>
+inline bool is_finite_context(const Context<S, N>& c) {
+  bool finite = is_finite(c.payload_kg) && is_finite(c.temperature_c) && is_finite(c.time_s);
+  for (std::size_t k = 0; k < 3; ++k)
+    finite = finite && is_finite(c.payload_com_m[k]) && is_finite(c.force_n[k]);
+  for (std::size_t i = 0; i < N; ++i)
+    finite = finite && is_finite(c.direction[i]) && is_finite(c.relative_speed[i]);
+  return finite;
+}
+
 }  // namespace detail
 
 /// The joint command that brings the arm with all its terms to the pose that the nominal arm has at q_command
 /// (rad).
 ///
 /// The result is a pure function of its arguments. Refused (command passed through): a command that is not
-/// finite or lies beyond a joint limit. Otherwise the result is finite, within the joint limits, and no joint
+/// finite or lies beyond a joint limit, a context that is not finite, and effects that grow beyond all bounds
+/// (a joint deflected by more than 1e4 rad, a product that overflows). Otherwise the result is finite, within the joint limits, and no joint
 /// differs from its command by more than settings.largest_correction_rad.
 template <class S, std::size_t N, class Cap>
 inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
@@ -172,6 +226,8 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
   for (std::size_t i = 0; i < N; ++i) {
     if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return out;
   }
+  // Asked here because a table holds its end values outside its nodes and would hide a NaN.
+  if (!detail::is_finite_context(context)) return out;
   Workspace<S, N> ws;
   ws.q = q_command;
   for (std::size_t i = 0; i < N; ++i) ws.reading[i] = sin_cos(q_command[i]);
@@ -201,27 +257,22 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
                         flange.col(2) * tool.z(),
                     settings);
     }
-    const std::array<S, N> dq = corrector.solve(position, orientation);
+    const std::array<S, N> dq =
+        corrector.solve(position, orientation, largest, largest * detail::allowed_turn<S>(k));
     for (std::size_t i = 0; i < N; ++i) {
-      S d = dq[i];
-      if (!is_finite(d)) return out;  // a context that is not finite ends here
-      if (d > largest) d = largest;
-      if (d < -largest) d = -largest;
-      ws.q[i] += d;
-      ws.reading[i] = rotate(ws.reading[i], d);
+      if (!is_finite(dq[i])) return out;  // effects beyond all bounds end here
+      ws.q[i] += dq[i];
+      ws.reading[i] = rotate(ws.reading[i], dq[i]);
     }
   }
-  S greatest = S(0);
-  for (std::size_t i = 0; i < N; ++i) {
-    const S change = ws.q[i] - q_command[i];
-    if (change > greatest) greatest = change;
-    if (-change > greatest) greatest = -change;
-  }
-  out.status = corrector.damped() ? StepStatus::near_singular : StepStatus::ok;
+  std::array<S, N> change;
+  for (std::size_t i = 0; i < N; ++i) change[i] = ws.q[i] - q_command[i];
+  const S greatest = detail::greatest_of(change);
+  out.status = corrector.gave_up() ? StepStatus::near_singular : StepStatus::ok;
   const S scale = greatest > largest ? largest / greatest : S(1);
   if (greatest > largest) out.status = StepStatus::limited;
   for (std::size_t i = 0; i < N; ++i) {
-    S q = greatest > largest ? q_command[i] + (ws.q[i] - q_command[i]) * scale : ws.q[i];
+    S q = greatest > largest ? q_command[i] + change[i] * scale : ws.q[i];
     if (q < model.lower(i)) {
       q = model.lower(i);
       out.status = StepStatus::at_limit;

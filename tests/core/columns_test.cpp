@@ -198,10 +198,7 @@ TEST(ExactColumn, CurveCoefficientsAreDualToo) {
     ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
     flexcomp::Linearisation<double> at;
     flexcomp::linearise(model, q, context, at);
-    const double x = std::abs(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
-    const double weight = x < 1   ? 2.0 / 3 - x * x + x * x * x / 2
-                          : x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6
-                                  : 0;
+    const double weight = arms::cardinal_spline(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
     const Vector6<double> got = flexcomp::screw(model, at, arms::on_link(3, flexcomp::slot::theta)) * weight;
     ASSERT_LE((got - expected).norm(), 1e-12);
   }

@@ -3,6 +3,7 @@
 #ifndef FLEXCOMP_TESTS_SUPPORT_ARMS_HPP
 #define FLEXCOMP_TESTS_SUPPORT_ARMS_HPP
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -229,12 +230,36 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
   return set;
 }
 
-/// Adds a curve of `size` coefficients within +-amplitude_rad on every joint.
+/// The cardinal cubic B-spline centred at 0 (de Boor), written apart from the core.
+inline double cardinal_spline(double x) {
+  x = std::abs(x);
+  if (x < 1) return 2.0 / 3 - x * x + x * x * x / 2;
+  return x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
+}
+
+/// The curve of a set of coefficients at reading q (rad), as effects.md defines it.
+inline double curve_value(const std::vector<double>& coefficients, double q) {
+  const double m = static_cast<double>(coefficients.size());
+  const double pi = 3.14159265358979323846;
+  double sum = 0;
+  for (std::size_t k = 0; k < coefficients.size(); ++k) {
+    // The nearest of the images of knot k, one turn apart.
+    double x = m * q / (2 * pi) - static_cast<double>(k);
+    x -= m * std::round(x / m);
+    sum += coefficients[k] * cardinal_spline(x);
+  }
+  return sum;
+}
+
+/// Adds a random curve of `size` coefficients on every joint, each reaching exactly +-amplitude_rad.
 inline void add_joint_curves(TermSet<double>& set, Random& random, double amplitude_rad,
                              std::size_t size = 18) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::vector<double> c(size);
-    for (double& v : c) v = random.around(amplitude_rad);
+    for (double& v : c) v = random.around(1);
+    double largest = 0;
+    for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(curve_value(c, k * 0.5 * deg)));
+    for (double& v : c) v *= amplitude_rad / largest;
     const std::uint16_t table = set.add_curve(c);
     flexcomp::Term<double>& t =
         set.add(on_link(i + 1, flexcomp::slot::theta), flexcomp::Basis::curve, 1.0, i);
@@ -257,18 +282,29 @@ inline flexcomp::Context<double, 6> random_context(const Robot& robot, Random& r
   return c;
 }
 
-/// Columns of the nominal Jacobian at the origin of Ftool, in F0: rows m, then rad.
-inline Eigen::Matrix<double, 6, 6> nominal_jacobian(const Robot& robot, const Joints& q) {
-  flexcomp::Model<double> model;
-  model.begin(robot);
-  model.finish();
-  flexcomp::Linearisation<double> at;
-  flexcomp::linearise(model, q, flexcomp::default_context<double>(robot), at);
-  Eigen::Matrix<double, 6, 6> j;
-  for (std::size_t i = 0; i < 6; ++i)
-    j.col(static_cast<int>(i)) = flexcomp::screw(model, at, on_link(i + 1, flexcomp::slot::theta));
-  return j;
-}
+/// The nominal Jacobian at the origin of Ftool, in F0: rows m, then rad. (kdl_test judges these screws.)
+class NominalJacobian {
+ public:
+  using Matrix = Eigen::Matrix<double, 6, 6>;
+
+  explicit NominalJacobian(const Robot& robot) : context_(flexcomp::default_context<double>(robot)) {
+    model_.begin(robot);
+    model_.finish();
+  }
+
+  Matrix operator()(const Joints& q) const {
+    flexcomp::Linearisation<double> at;
+    flexcomp::linearise(model_, q, context_, at);
+    Matrix j;
+    for (std::size_t i = 0; i < 6; ++i)
+      j.col(static_cast<int>(i)) = flexcomp::screw(model_, at, on_link(i + 1, flexcomp::slot::theta));
+    return j;
+  }
+
+ private:
+  flexcomp::Model<double> model_;
+  flexcomp::Context<double, 6> context_;
+};
 
 /// Angle between two rotations, rad; good for small angles.
 template <class A, class B>
