@@ -1,0 +1,78 @@
+/// \file
+/// One self-contained page about a calibration: inline SVG, no scripts, no network; light, dark and on paper. Whoever
+/// has numbers fills a Page; whatever is left empty leaves no trace on the page. All text is escaped.
+#ifndef FLEXCOMP_HOST_REPORT_PAGE_HPP
+#define FLEXCOMP_HOST_REPORT_PAGE_HPP
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "flexcomp/robot.hpp"
+
+namespace flexcomp::host {
+
+/// What was off at one pose, before and after.
+struct PagePose {
+  std::array<double, joint_count> q_rad{};  ///< reading, or command before correction
+  std::array<double, 3> before_m{};         ///< error vector: measured - modelled, or reached - wanted
+  std::array<double, 3> after_m{};
+  std::optional<double> before_rad;  ///< angle of the rotation error, where orientations are known
+  std::optional<double> after_rad;
+  bool outlier = false;  ///< does not count in full
+};
+
+/// A set of poses with its summary, the two plots per pose, the histogram and the residuals against each joint.
+struct PagePoses {
+  std::string title;   ///< "Poses that were fitted", "Validation: where the arm truly went"
+  std::string about;   ///< a sentence or two below it
+  std::string before;  ///< what "before" is: "nominal model, frames fitted"
+  std::string after;   ///< what "after" is: "calibrated model"
+  std::vector<PagePose> poses;
+  /// Mean length of the measurement's own error: nothing can be seen below it. Drawn where it is given.
+  std::optional<double> noise_floor_m;
+};
+
+struct PageParameter {
+  std::string name;  ///< link1.theta_deg, joint_compliance[joint=2].rad_per_nm
+  double value = 0;  ///< in the unit that the name ends with
+  std::optional<double> sigma;
+};
+
+struct PageConfounded {
+  std::string parameter;
+  std::vector<std::string> with;
+};
+
+struct PageFact {
+  std::string name;
+  std::string value;
+};
+
+/// A link to a page beside this one, or to one of its own sections.
+struct PageLink {
+  std::string href;
+  std::string text;
+};
+
+struct Page {
+  std::string title;                ///< "Calibration of staubli-tx60l"
+  std::string summary;              ///< what came out, in a sentence or two for somebody in a hurry
+  std::vector<std::string> doubts;  ///< why the result must not be relied on; shown first, in words
+  std::vector<PageFact> facts;      ///< data file, poses, parameters, condition, chi-square per dof …
+  std::vector<PagePoses> poses;
+  std::vector<PageParameter> parameters;
+  std::vector<PageConfounded> confounded;
+  std::vector<std::string> missing;  ///< parameters that these data do not know though such data could
+  std::vector<std::array<double, joint_count>> cure_rad;  ///< poses that would make them known
+  std::vector<PageLink> links;
+  std::string made_by;  ///< "flexcomp 0.1.0, 2025-01-31"
+};
+
+/// The page as one HTML document.
+std::string html(const Page& page);
+
+}  // namespace flexcomp::host
+
+#endif
