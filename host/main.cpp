@@ -34,8 +34,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "flexcomp " FLEXCOMP_VERSION);
   app.require_subcommand(1);
   add_simulate(app);
-  // add_identify(app);
-  // add_validate(app);
+  add_identify(app);
+  add_validate(app);
   add_predict(app);
   add_compensate(app);
   add_push(app);
@@ -43,6 +43,8 @@ int main(int argc, char** argv) {
   add_status(app);
   add_rollback(app);
   // add_probe(app);
+  // The help text would end in the middle of a line.
+  for (CLI::App* command : app.get_subcommands({})) command->footer(command->get_footer() + "\n");
   try {
     app.parse(argc, argv);
     return status(ExitStatus::done);

@@ -25,13 +25,14 @@ double median(std::vector<double> v) {
 }
 
 struct RobustWeights {
-  double scale = 1;             // standard deviation of the whitened residual in the bulk
-  std::vector<double> weight;   // of the squared residual, per row
+  double scale = 1;            // standard deviation of the whitened residual in the bulk
+  std::vector<double> weight;  // of the squared residual, per row
 };
 
 /// The scale from the median of the rows' chi-squares, so that a third of wild rows does not move it; then full weight
 /// up to the 99.9 % quantile and quantile / square beyond.
-RobustWeights weigh(const Eigen::VectorXd& square, const std::vector<Observation>& rows, std::size_t unknowns) {
+RobustWeights weigh(const Eigen::VectorXd& square, const std::vector<Observation>& rows,
+                    std::size_t unknowns) {
   std::vector<double> ratio(rows.size());
   double measured = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -57,8 +58,8 @@ double chi2_quantile(double probability, double degrees_of_freedom) {
   return boost::math::quantile(boost::math::chi_squared(degrees_of_freedom), probability);
 }
 
-Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows, const RobotFile& robot,
-        const EstimatorOptions& options) {
+Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
+        const RobotFile& robot, const EstimatorOptions& options) {
   Fit out;
   out.estimate = start;
   const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
@@ -99,7 +100,7 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
       // What the undamped step would gain is the proof of convergence: the gradient in the metric of the problem.
       const Eigen::VectorXd newton = normal.ldlt().solve(gradient);
       out.newton_decrement = gradient.dot(newton);
-      if (out.newton_decrement < 1e-10 * std::max(1.0, robust.scale * robust.scale)) {
+      if (out.newton_decrement < 1e-9 * std::max(1.0, robust.scale * robust.scale)) {
         settled = true;
         break;
       }
@@ -136,8 +137,9 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
     const std::vector<double> before = robust.weight;
     robust = weigh(square, rows, unknowns.count());
     double change = 0;
-    for (std::size_t k = 0; k < rows.size(); ++k) change = std::max(change, std::abs(robust.weight[k] - before[k]));
-    if (change < 1e-9) break;
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      change = std::max(change, std::abs(robust.weight[k] - before[k]));
+    if (change < 1e-6) break;
   }
   normal_equations();
   const Eigen::LDLT<Eigen::MatrixXd> factor(normal);

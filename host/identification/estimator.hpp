@@ -12,20 +12,20 @@
 namespace flexcomp::host {
 
 struct EstimatorOptions {
-  double upsilon = 10;        ///< step length coefficient of the damping; 4 … 100 all work (the paper)
+  double upsilon = 10;  ///< step length coefficient of the damping; 4 … 100 all work (the paper)
   int largest_iterations = 200;
-  bool robust = true;         ///< false: every row counts in full
+  bool robust = true;  ///< false: every row counts in full
   /// Called after each accepted step with the iteration and the cost; may be empty.
   std::function<void(int, double)> progress;
 };
 
 struct Fit {
   Estimate estimate;
-  bool converged = false;     ///< the exact gradient vanishes, see newton_decrement
-  int iterations = 0;         ///< accepted steps
+  bool converged = false;  ///< the exact gradient vanishes, see newton_decrement
+  int iterations = 0;      ///< accepted steps
   /// What a full Gauss-Newton step would still gain, in units of chi-square: below 1e-8 is converged.
   double newton_decrement = 0;
-  double chi2 = 0;            ///< sum of squared whitened residuals of the rows that count in full
+  double chi2 = 0;  ///< sum of squared whitened residuals of the rows that count in full
   double degrees_of_freedom = 0;
   /// Standard deviation of the whitened residual as the bulk of the rows shows it; 1 where the model explains the data.
   double scale = 1;
@@ -33,7 +33,8 @@ struct Fit {
   /// Covariance of the unknowns in units_of(); from the declared noise, or from the residuals where chi-square says
   /// that the noise alone does not explain them.
   Eigen::MatrixXd covariance;
-  Eigen::VectorXd singular_values;  ///< of the whitened, scaled derivative of the parameters (frames projected out)
+  Eigen::VectorXd
+      singular_values;  ///< of the whitened, scaled derivative of the parameters (frames projected out)
 
   double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
 };

@@ -20,8 +20,8 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
 }
 
 /// R_k = F N_k E for all rows: alternating nearest rotations from 24 starts (the turns of a cube), best kept.
-void align_rotations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model, Pose<double>& f,
-                     Pose<double>& e) {
+void align_rotations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model,
+                     Pose<double>& f, Pose<double>& e) {
   double best = -1;
   for (int start = 0; start < 24; ++start) {
     Eigen::Matrix3d e_rotation =
@@ -55,8 +55,8 @@ void align_rotations(const std::vector<Observation>& rows, const std::vector<Pos
 }
 
 /// p_k = F_p + F_R (P_k + N_k E_p) is linear in F_p and E_p once F_R is known.
-void solve_translations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model, Pose<double>& f,
-                        Pose<double>& e) {
+void solve_translations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model,
+                        Pose<double>& f, Pose<double>& e) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6<double> right = Vector6<double>::Zero();
   for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -6,14 +6,16 @@
 
 namespace flexcomp::host {
 
-Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order, double tolerance) {
+Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order,
+                      double tolerance) {
   Elimination out;
   Eigen::MatrixXd basis(matrix.rows(), static_cast<Eigen::Index>(order.size()));
   Eigen::Index rank = 0;
   std::vector<std::size_t> kept_in_order;
   std::vector<std::size_t> lost;
   double largest = 0;
-  for (const std::size_t c : order) largest = std::max(largest, matrix.col(static_cast<Eigen::Index>(c)).norm());
+  for (const std::size_t c : order)
+    largest = std::max(largest, matrix.col(static_cast<Eigen::Index>(c)).norm());
   for (const std::size_t c : order) {
     Eigen::VectorXd column = matrix.col(static_cast<Eigen::Index>(c));
     const double norm = column.norm();
@@ -36,7 +38,8 @@ Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size
   if (!lost.empty()) {
     Eigen::MatrixXd kept(matrix.rows(), rank);
     for (Eigen::Index k = 0; k < rank; ++k) {
-      kept.col(k) = matrix.col(static_cast<Eigen::Index>(kept_in_order[static_cast<std::size_t>(k)])).normalized();
+      kept.col(k) =
+          matrix.col(static_cast<Eigen::Index>(kept_in_order[static_cast<std::size_t>(k)])).normalized();
     }
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(kept);
     for (const std::size_t c : lost) {
@@ -44,7 +47,8 @@ Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size
       LostColumn entry{c, {}};
       const double most = share.cwiseAbs().maxCoeff();
       for (Eigen::Index k = 0; k < rank; ++k) {
-        if (std::abs(share[k]) > 1e-3 * most) entry.with.push_back(kept_in_order[static_cast<std::size_t>(k)]);
+        if (std::abs(share[k]) > 1e-3 * most)
+          entry.with.push_back(kept_in_order[static_cast<std::size_t>(k)]);
       }
       out.lost.push_back(entry);
     }
@@ -71,7 +75,8 @@ std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermS
   };
   std::vector<std::size_t> order(unknowns.count());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
   return order;
 }
 

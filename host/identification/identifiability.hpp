@@ -26,7 +26,8 @@ struct Elimination {
 
 /// Orthogonalises the columns in the given order and drops each one of which less than `tolerance` of its norm is left
 /// after projection onto those kept. Columns are scaled to norm 1 first, so nothing depends on noise or units.
-Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order, double tolerance = 1e-6);
+Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order,
+                      double tolerance = 1e-6);
 
 /// Preference where columns are confounded: frames, base x y rx ry, links 1 to 6, effects, and last what the paper loses
 /// too: base z, base rz, compliance of joint 1 (contract.md).

@@ -21,6 +21,10 @@ namespace {
 constexpr double usual_error_per_reach = 5e-4;
 constexpr double suspicious_factor = 100;
 
+/// A column of which less is left after projection on the others counts as confounded with them: a tool point 0.2 mm off
+/// axis 6, as fitted, does not make known what a point on the axis cannot know.
+constexpr double structural_tolerance = 1e-3;
+
 double reach(const RobotFile& robot) {
   double sum = 0;
   for (const NominalLink& link : robot.nominal.links) sum += std::hypot(link.a_m, link.d_m);
@@ -32,15 +36,17 @@ double spread(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
   double sum = 0;
-  for (const Eigen::Vector3d& p : points) sum += (p - mean).squaredNorm() / static_cast<double>(points.size());
+  for (const Eigen::Vector3d& p : points)
+    sum += (p - mean).squaredNorm() / static_cast<double>(points.size());
   return std::sqrt(sum);
 }
 
-void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows, const Before& before,
-                            const std::string& source) {
+void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
+                            const Before& before, const std::string& source) {
   const double limit = suspicious_factor * usual_error_per_reach * reach(robot);
-  const double found = before.fitted_frames ? std::min(before.fitted_frames->rms_m, before.nominal_frames.rms_m)
-                                            : before.nominal_frames.rms_m;
+  const double found = before.fitted_frames
+                           ? std::min(before.fitted_frames->rms_m, before.nominal_frames.rms_m)
+                           : before.nominal_frames.rms_m;
   if (!(found > limit)) return;
   std::vector<Eigen::Vector3d> measured;
   std::vector<Eigen::Vector3d> nominal;
@@ -76,7 +82,8 @@ std::vector<std::array<double, joint_count>> poses_that_cure(const Eigen::Matrix
     for (Eigen::Index c = 0; c < count; ++c) {
       if (taken.count(c) != 0) continue;
       const auto h = candidates.middleRows<6>(6 * c);
-      const Eigen::Matrix<double, 6, 6> gain = Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
+      const Eigen::Matrix<double, 6, 6> gain =
+          Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
       const double information = gain.llt().matrixLLT().diagonal().array().log().sum();
       if (information > best) {
         best = information;
@@ -99,6 +106,47 @@ Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>&
     out.col(static_cast<Eigen::Index>(k)) = m.col(static_cast<Eigen::Index>(columns[k]));
   }
   return out;
+}
+
+Eigen::VectorXd sigmas(const Eigen::MatrixXd& matrix) {
+  const Eigen::MatrixXd normal = matrix.transpose() * matrix;
+  return normal.ldlt()
+      .solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()))
+      .diagonal()
+      .cwiseMax(0)
+      .cwiseSqrt();
+}
+
+/// Known in principle is not known: a parameter whose standard deviation is over 30 units (3 mm, 1.5 degrees) and over 30
+/// times what as many random poses would give is left out, the last in the order first, until none is. Otherwise
+/// near-confounded ones run off together (a5 = 43 mm +- 40 mm) and the others with them.
+std::vector<std::size_t> drop_the_unknowable(const Eigen::MatrixXd& data, const Eigen::MatrixXd& reference,
+                                             const std::vector<std::size_t>& order, std::size_t frames,
+                                             std::vector<std::size_t>& kept) {
+  constexpr double too_many = 30;
+  const double more_rows =
+      std::sqrt(static_cast<double>(reference.rows()) / static_cast<double>(data.rows()));
+  std::vector<std::size_t> dropped;
+  while (!kept.empty()) {
+    const Eigen::VectorXd here = sigmas(select(data, kept));
+    const Eigen::VectorXd usual = sigmas(select(reference, kept)) * more_rows;
+    std::size_t worst = kept.size();
+    std::size_t latest = 0;
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      const Eigen::Index i = static_cast<Eigen::Index>(k);
+      if (kept[k] < frames || !(here[i] > too_many && here[i] > too_many * usual[i])) continue;
+      const std::size_t position =
+          static_cast<std::size_t>(std::find(order.begin(), order.end(), kept[k]) - order.begin());
+      if (worst == kept.size() || position > latest) {
+        worst = k;
+        latest = position;
+      }
+    }
+    if (worst == kept.size()) break;
+    dropped.push_back(kept[worst]);
+    kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(worst));
+  }
+  return dropped;
 }
 
 /// Terms that no kept parameter drives say nothing: they are left out of the calibration.
@@ -135,8 +183,8 @@ Before errors_before(const RobotFile& robot, const std::vector<Observation>& row
   return before;
 }
 
-Identification identify(const RobotFile& robot, const std::vector<Observation>& rows, const std::string& source,
-                        const IdentifyOptions& options) {
+Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
+                        const std::string& source, const IdentifyOptions& options) {
   Identification out;
   Estimate start;
   out.before = errors_before(robot, rows, &start);
@@ -144,10 +192,9 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
 
   Estimate nominal;
   const auto nominal_model = prepare(TermSet(), robot, source);
-  const bool fit_frames_too =
-      options.frames == FrameChoice::fit ||
-      (options.frames == FrameChoice::by_distance &&
-       nominal_frames_are_off(residuals(nominal, *nominal_model, rows), rows));
+  const bool fit_frames_too = options.frames == FrameChoice::fit ||
+                              (options.frames == FrameChoice::by_distance &&
+                               nominal_frames_are_off(residuals(nominal, *nominal_model, rows), rows));
   if (!fit_frames_too) start = Estimate();
 
   ParametricModel paper = paper_model(robot.nominal, options.model, !fit_frames_too);
@@ -165,7 +212,7 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   const auto zero_model = prepare(start.set, robot, source);
   const Eigen::MatrixXd reference_matrix = linearised(start, *zero_model, reference, all).derivative;
   const Eigen::MatrixXd data_matrix = linearised(start, *zero_model, rows, all).derivative;
-  const Elimination possible = eliminate(reference_matrix, order);
+  const Elimination possible = eliminate(reference_matrix, order, structural_tolerance);
   for (const LostColumn& lost : possible.lost) {
     Confounded entry{names[lost.column], {}};
     for (const std::size_t c : lost.with) entry.with.push_back(names[c]);
@@ -175,7 +222,12 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   for (const std::size_t c : order) {
     if (std::binary_search(possible.kept.begin(), possible.kept.end(), c)) possible_order.push_back(c);
   }
-  const Elimination known = eliminate(data_matrix, possible_order);
+  Elimination known = eliminate(data_matrix, possible_order);
+  for (const LostColumn& lost : known.lost) out.missing.push_back(names[lost.column]);
+  for (const std::size_t c :
+       drop_the_unknowable(data_matrix, reference_matrix, possible_order, all.frames.size(), known.kept)) {
+    out.missing.push_back(names[c]);
+  }
 
   Unknowns fitted;
   for (const std::size_t c : known.kept) {
@@ -187,7 +239,6 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   }
   out.frame_parameters = fitted.frames.size();
   out.identifiable = fitted.parameters.size();
-  for (const LostColumn& lost : known.lost) out.missing.push_back(names[lost.column]);
 
   if (fitted.count() > 0) {
     out.fit = fit(start, fitted, rows, robot, options.estimator);
@@ -195,26 +246,10 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
     out.fit.estimate = start;
   }
 
-  // A parameter may be known in principle and yet be so badly known that its value means nothing.
   const Eigen::VectorXd sigma_units = out.fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  {
-    const Eigen::MatrixXd chosen = select(reference_matrix, known.kept);
-    const Eigen::MatrixXd information = chosen.transpose() * chosen * (static_cast<double>(rows.size()) / 1000.0);
-    const Eigen::VectorXd usual = information.ldlt()
-                                      .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()))
-                                      .diagonal()
-                                      .cwiseMax(0)
-                                      .cwiseSqrt();
-    const std::vector<std::string> fitted_names = names_of(fitted);
-    for (std::size_t k = 0; k < fitted_names.size(); ++k) {
-      const Eigen::Index i = static_cast<Eigen::Index>(k);
-      if (sigma_units[i] > 100 && sigma_units[i] > 100 * std::max(1.0, out.fit.scale) * usual[i]) {
-        out.missing.push_back(fitted_names[k]);
-      }
-    }
-  }
   if (!out.missing.empty()) {
-    out.cure = poses_that_cure(select(data_matrix, possible.kept), select(reference_matrix, possible.kept), reference);
+    out.cure = poses_that_cure(select(data_matrix, possible.kept), select(reference_matrix, possible.kept),
+                               reference);
   }
 
   const Eigen::VectorXd& s = out.fit.singular_values;
@@ -244,9 +279,10 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
       largest = std::max(largest, std::abs(t.coefficient));
     }
     if (shift > 0.020 || turn > radians(2)) {
-      throw InputError(source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
-                       fmt::format("{:.1f} mm, {:.2f} degrees; --frames fit lets the measurement frame lie anywhere",
-                                   shift * 1e3, degrees(turn)));
+      throw InputError(
+          source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
+          fmt::format("{:.1f} mm, {:.2f} degrees; --frames fit lets the measurement frame lie anywhere",
+                      shift * 1e3, degrees(turn)));
     }
   }
   out.calibration.confounded = out.confounded;
@@ -259,16 +295,18 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   if (!out.missing.empty()) {
     std::string list;
     for (const std::string& m : out.missing) list += (list.empty() ? "" : ", ") + m;
-    out.doubts.push_back(fmt::format(
-        "these {} rows cannot know {} parameters that random poses of the same kind would: {}", rows.size(),
-        out.missing.size(), list));
+    out.doubts.push_back(
+        fmt::format("these {} rows cannot know {} parameters that random poses of the same kind would: {}",
+                    rows.size(), out.missing.size(), list));
   }
   if (!out.fit.converged) {
-    out.doubts.push_back(fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
-                                     out.fit.newton_decrement));
+    out.doubts.push_back(
+        fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
+                    out.fit.newton_decrement));
   }
   if (out.missing.empty() && out.fit.degrees_of_freedom < 1) {
-    out.doubts.push_back("there are as many unknowns as measured numbers: nothing is left to check the result against");
+    out.doubts.push_back(
+        "there are as many unknowns as measured numbers: nothing is left to check the result against");
   }
   return out;
 }

@@ -53,11 +53,12 @@ struct Identification {
 /// \param source  names the data in messages
 /// \throws InputError  residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
 ///                     millimetres, another arm), unless options.force; a fitted base above 20 mm or 2 degrees
-Identification identify(const RobotFile& robot, const std::vector<Observation>& rows, const std::string& source,
-                        const IdentifyOptions& options);
+Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
+                        const std::string& source, const IdentifyOptions& options);
 
 /// Errors of the nominal arm, in nominal and in fitted frames. `model` (optional) receives the fitted frames.
-Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
+Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows,
+                     Estimate* fitted = nullptr);
 
 }  // namespace flexcomp::host
 

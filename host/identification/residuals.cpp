@@ -25,7 +25,8 @@ Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& e) {
   const double angle = e.norm();
   const Eigen::Matrix3d s = skew(e);
   const double half = 0.5 * angle;
-  const double square = angle < 1e-4 ? 1.0 / 12 : (1 - half * std::cos(half) / std::sin(half)) / (angle * angle);
+  const double square =
+      angle < 1e-4 ? 1.0 / 12 : (1 - half * std::cos(half) / std::sin(half)) / (angle * angle);
   return Eigen::Matrix3d::Identity() + 0.5 * s + square * s * s;
 }
 
@@ -129,9 +130,10 @@ Linearised linearised(const Estimate& estimate, const HostModel& model, const st
             }
             column += screw(model, at, term.place) * (term.coefficient * weight * factor);
           } else {
-            const auto row_cell = detail::find_cell<double>(
-                estimate.set.values.data() + table.offset, table.rows,
-                detail::covariate<double, joint_count>(table.row_covariate, table.row_joint, row.q_rad, row.context));
+            const auto row_cell =
+                detail::find_cell<double>(estimate.set.values.data() + table.offset, table.rows,
+                                          detail::covariate<double, joint_count>(
+                                              table.row_covariate, table.row_joint, row.q_rad, row.context));
             const auto column_cell = detail::find_cell<double>(
                 estimate.set.values.data() + table.offset + table.rows, table.columns,
                 detail::covariate<double, joint_count>(table.column_covariate, table.column_joint, row.q_rad,
@@ -224,9 +226,11 @@ void move(Estimate& estimate, const Unknowns& unknowns, const Eigen::VectorXd& d
     Eigen::Matrix<double, 12, 1> frame = Eigen::Matrix<double, 12, 1>::Zero();
     for (const std::size_t i : unknowns.frames) frame[static_cast<Eigen::Index>(i)] = step[k++];
     estimate.f.position += frame.segment<3>(0);
-    estimate.f.rotation = Eigen::Quaterniond(rotation_of(frame.segment<3>(3)) * estimate.f.rotation).normalized();
+    estimate.f.rotation =
+        Eigen::Quaterniond(rotation_of(frame.segment<3>(3)) * estimate.f.rotation).normalized();
     estimate.e.position += frame.segment<3>(6);
-    estimate.e.rotation = Eigen::Quaterniond(estimate.e.rotation * rotation_of(frame.segment<3>(9))).normalized();
+    estimate.e.rotation =
+        Eigen::Quaterniond(estimate.e.rotation * rotation_of(frame.segment<3>(9))).normalized();
   }
   for (const Parameter& p : unknowns.parameters) p.set(estimate.set, p.get(estimate.set) + step[k++]);
 }

@@ -1,0 +1,43 @@
+#include "commands/accuracy.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+nlohmann::ordered_json to_json(const ErrorStatistics& s) {
+  nlohmann::ordered_json j{{"mean_mm", s.mean_m * 1e3}, {"rms_mm", s.rms_m * 1e3}, {"max_mm", s.max_m * 1e3}};
+  if (s.mean_rad) j["mean_deg"] = degrees(*s.mean_rad);
+  return j;
+}
+
+nlohmann::ordered_json to_json(const Before& before) {
+  nlohmann::ordered_json j{{"nominal_frames", to_json(before.nominal_frames)}};
+  if (before.fitted_frames) j["fitted_frames"] = to_json(*before.fitted_frames);
+  return j;
+}
+
+std::string accuracy_table(const Before& before, const ErrorStatistics& after) {
+  const auto line = [](const char* what, const ErrorStatistics& s) {
+    return fmt::format("  {:<24} {:>10.4f} {:>10.4f} {:>10.4f}{}\n", what, s.mean_m * 1e3, s.rms_m * 1e3,
+                       s.max_m * 1e3, s.mean_rad ? fmt::format(" {:>10.5f}", degrees(*s.mean_rad)) : "");
+  };
+  std::string text = fmt::format("  {:<24} {:>10} {:>10} {:>10}{}\n", "position error", "mean mm", "rms mm",
+                                 "max mm", after.mean_rad ? fmt::format(" {:>10}", "mean deg") : "");
+  text += line("before, nominal frames", before.nominal_frames);
+  if (before.fitted_frames) text += line("before, fitted frames", *before.fitted_frames);
+  text += line("after", after);
+  text.pop_back();
+  return text;
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += (text.empty() ? "" : "\n  ") + line;
+  return text;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,27 @@
+/// \file
+/// Errors before and after, as `identify` and `validate` both say them: to people and to machines.
+#ifndef FLEXCOMP_HOST_COMMANDS_ACCURACY_HPP
+#define FLEXCOMP_HOST_COMMANDS_ACCURACY_HPP
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "identification/identify.hpp"
+
+namespace flexcomp::host {
+
+/// {"mean_mm", "rms_mm", "max_mm", "mean_deg"} (the last only where orientations were measured).
+nlohmann::ordered_json to_json(const ErrorStatistics& s);
+
+/// {"nominal_frames": {…}, "fitted_frames": {…}}
+nlohmann::ordered_json to_json(const Before& before);
+
+/// The three or two lines of a table: before (nominal frames, fitted frames) and after.
+std::string accuracy_table(const Before& before, const ErrorStatistics& after);
+
+/// Joins doubts into one message, each on a line of its own.
+std::string joined(const std::vector<std::string>& lines);
+
+}  // namespace flexcomp::host
+
+#endif

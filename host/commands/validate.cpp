@@ -1,0 +1,69 @@
+#include "identification/validate.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands/accuracy.hpp"
+#include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "errors.hpp"
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+struct Validate {
+  CommonOptions common;
+  std::string robot;
+  std::string calibration;
+  std::string data;
+  bool force = false;
+
+  void run() const;
+};
+
+void Validate::run() const {
+  const RobotFile robot_file = load_robot(robot);
+  const Calibration set = load_calibration(calibration, robot_file);
+  const DataFile file = load_data(data, robot_file, {force});
+  std::vector<std::string> warnings = file.warnings;
+  const std::vector<Observation> rows = observe(file, robot_file, &warnings);
+  common.warn(warnings);
+  const Validation v = validate(robot_file, set, rows, data);
+  common.say(fmt::format("{}: {} rows of {} with {}", data, rows.size(), robot_file.name, calibration));
+  common.say(accuracy_table(v.before, v.after));
+  common.say(fmt::format("  chi-square per degree of freedom {:.3g}", v.chi2_per_dof()));
+  common.write_json({{"before", to_json(v.before)},
+                     {"after", to_json(v.after)},
+                     {"poses", rows.size()},
+                     {"chi2_per_dof", v.chi2_per_dof()},
+                     {"degrees_of_freedom", v.degrees_of_freedom}});
+  if (!v.doubts.empty()) throw DoubtfulResult(fmt::format("{}: {}", calibration, joined(v.doubts)));
+}
+
+}  // namespace
+
+void add_validate(CLI::App& app) {
+  auto options = std::make_shared<Validate>();
+  CLI::App* command = app.add_subcommand(
+      "validate", "Error before and after on measured poses that were not used for identification");
+  add_robot_option(*command, options->robot);
+  command->add_option("--calibration", options->calibration, "Calibration file")
+      ->type_name("CAL.yaml")
+      ->required();
+  command->add_option("--data", options->data, "Measured data that were not fitted [deg, mm]")
+      ->type_name("V.csv")
+      ->required();
+  add_force_option(*command, options->force);
+  options->common.add_to(*command);
+  command->footer(
+      "Example:\n  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data others.csv\n"
+      "Exit status 5: the error after is not below the error before, or chi-square per degree of freedom "
+      "lies outside its 99.9 % interval.");
+  command->callback([options] { options->run(); });
+}
+
+}  // namespace flexcomp::host

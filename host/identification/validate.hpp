@@ -1,0 +1,31 @@
+/// \file
+/// How far a calibrated arm is off on rows that were not fitted.
+#ifndef FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
+#define FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
+
+#include <string>
+#include <vector>
+
+#include "identification/identify.hpp"
+
+namespace flexcomp::host {
+
+struct Validation {
+  Before before;
+  ErrorStatistics after;
+  std::vector<RowResidual> residuals;  ///< after, per row
+  std::vector<RowResidual> nominal;    ///< before, in fitted frames where there are any, per row
+  double chi2 = 0;                     ///< after; over measured_numbers(), nothing is fitted here
+  double degrees_of_freedom = 0;
+  std::vector<std::string> doubts;  ///< why the calibration must not be relied on; empty where it may
+
+  double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
+};
+
+/// Errors of the rows with the frames of the calibration (F = E = 1 where it has none).
+Validation validate(const RobotFile& robot, const Calibration& calibration,
+                    const std::vector<Observation>& rows, const std::string& source);
+
+}  // namespace flexcomp::host
+
+#endif
