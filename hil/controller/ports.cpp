@@ -1,0 +1,338 @@
+#include "ports.hpp"
+
+#include <fcntl.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <termios.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <map>
+
+#include "errors.hpp"
+
+namespace flexcomp::hil {
+
+namespace {
+
+std::string reason() { return std::strerror(errno); }
+
+/// How long a serial line is silent before it counts as back in step. Longer than the standard's 1.75 ms because a
+/// process sees bytes in bursts; much shorter than any client waits for an answer.
+constexpr std::uint32_t rtu_gap_us = 50'000;
+
+constexpr std::size_t most_unsent_bytes = 65536;
+
+}  // namespace
+
+std::uint32_t now_ms() {
+  using namespace std::chrono;
+  return static_cast<std::uint32_t>(
+      duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count());
+}
+
+std::uint32_t now_us() {
+  using namespace std::chrono;
+  return static_cast<std::uint32_t>(
+      duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
+}
+
+// --- CAN --------------------------------------------------------------------------------------------------------
+
+namespace {
+
+Descriptor open_can(const host::CanAddress& address) {
+  const auto fail = [&address](const std::string& what) {
+    throw host::BusError("can:" + address.interface + ": " + what);
+  };
+  Descriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
+  if (!socket) fail("this kernel has no SocketCAN (" + reason() + "); see hil/with-vcan");
+  const unsigned index = ::if_nametoindex(address.interface.c_str());
+  if (index == 0) fail("no such interface");
+  // Exactly the identifiers that concern this node, 11 bits, data frames only.
+  const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+  const can_filter filters[2] = {
+      {wire::canopen::nmt_id, mask},
+      {static_cast<canid_t>(wire::canopen::sdo_request_id + address.node), mask},
+  };
+  if (::setsockopt(socket.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0) fail(reason());
+  sockaddr_can bound{};
+  bound.can_family = AF_CAN;
+  bound.can_ifindex = static_cast<int>(index);
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&bound), sizeof bound) != 0) fail(reason());
+  return socket;
+}
+
+}  // namespace
+
+CanPort::CanPort(firmware::Device& device, firmware::Origin origin, const host::CanAddress& address,
+                 std::uint16_t heartbeat_ms)
+    : address_(address),
+      socket_(open_can(address)),
+      node_(device, origin, {address.node, heartbeat_ms, 2000}, {this, send}) {}
+
+void CanPort::wait_on(std::vector<pollfd>& descriptors) const {
+  // A socket whose interface is down would report an error for ever; serve() tries again on each turn anyway.
+  if (!down_) descriptors.push_back({socket_.get(), POLLIN, 0});
+}
+
+void CanPort::serve() {
+  for (int k = 0; k < 256; ++k) {
+    can_frame frame{};
+    const ssize_t n = ::read(socket_.get(), &frame, sizeof frame);
+    if (n < 0 && errno != EAGAIN && errno != EINTR) {
+      if (!down_) std::fprintf(stderr, "flexcomp-controller: %s: %s\n", text().c_str(), std::strerror(errno));
+      down_ = true;
+      break;
+    }
+    if (n < 0) {
+      down_ = false;
+      break;
+    }
+    if (n != static_cast<ssize_t>(sizeof frame)) continue;
+    node_.receive(static_cast<std::uint16_t>(frame.can_id & CAN_SFF_MASK), frame.data,
+                  frame.can_dlc <= 8 ? frame.can_dlc : 8U);
+  }
+  node_.poll(now_ms());
+}
+
+bool CanPort::send(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) {
+  can_frame frame{};
+  frame.can_id = id;
+  frame.can_dlc = size;
+  std::memcpy(frame.data, bytes, size);
+  return ::write(static_cast<CanPort*>(self)->socket_.get(), &frame, sizeof frame) ==
+         static_cast<ssize_t>(sizeof frame);
+}
+
+std::string CanPort::text() const { return host::BusAddress{address_}.text(); }
+
+// --- Modbus TCP -------------------------------------------------------------------------------------------------
+
+TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
+                 const host::ModbusTcpAddress& address)
+    : address_(address) {
+  const auto fail = [&address](const std::string& what) {
+    throw host::BusError("modbus-tcp:" + address.host + ":" + std::to_string(address.port) + ": " + what);
+  };
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE;
+  addrinfo* found = nullptr;
+  const int r = ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+  if (r != 0) fail(::gai_strerror(r));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> list(found, ::freeaddrinfo);
+  std::string why = "no address";
+  for (const addrinfo* a = found; a != nullptr && !listener_; a = a->ai_next) {
+    Descriptor s(::socket(a->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int on = 1;
+    if (s && ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
+        ::bind(s.get(), a->ai_addr, a->ai_addrlen) == 0 && ::listen(s.get(), 16) == 0) {
+      listener_ = std::move(s);
+    } else {
+      why = reason();
+    }
+  }
+  if (!listener_) fail(why);
+  sockaddr_storage bound{};
+  socklen_t size = sizeof bound;
+  if (::getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&bound), &size) == 0) {
+    const std::uint16_t port = bound.ss_family == AF_INET6
+                                   ? reinterpret_cast<sockaddr_in6*>(&bound)->sin6_port
+                                   : reinterpret_cast<sockaddr_in*>(&bound)->sin_port;
+    address_.port = ntohs(port);
+  }
+  for (std::size_t k = 0; k < connections; ++k) {
+    connections_.push_back(
+        std::make_unique<Connection>(device, static_cast<firmware::Origin>(first_origin + k)));
+  }
+}
+
+void TcpPort::wait_on(std::vector<pollfd>& descriptors) const {
+  descriptors.push_back({listener_.get(), POLLIN, 0});
+  for (const auto& c : connections_) {
+    if (!c->socket) continue;
+    const int read = c->out.size() < most_unsent_bytes ? POLLIN : 0;
+    const int write = c->out.empty() ? 0 : POLLOUT;
+    descriptors.push_back({c->socket.get(), static_cast<short>(read | write), 0});
+  }
+}
+
+void TcpPort::accept() {
+  for (;;) {
+    Descriptor s(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!s) return;
+    const int on = 1;
+    ::setsockopt(s.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    ::setsockopt(s.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+    // Where all are taken the one that was silent longest gives way (Messaging on TCP/IP V1.0b, 4.2.1).
+    Connection* place = connections_.front().get();
+    for (const auto& c : connections_) {
+      if (!c->socket) {
+        place = c.get();
+        break;
+      }
+      if (c->used < place->used) place = c.get();
+    }
+    close(*place);
+    place->socket = std::move(s);
+    place->used = ++clock_;
+    place->stream =
+        std::make_unique<firmware::ModbusTcp>(place->server, address_.unit, firmware::Transmit{place, send});
+  }
+}
+
+void TcpPort::close(Connection& c) {
+  if (!c.socket) return;
+  c.server.disconnect();
+  c.socket.close();
+  c.out.clear();
+  c.stream.reset();
+}
+
+void TcpPort::send(void* connection, const std::uint8_t* bytes, std::size_t size) {
+  Connection& c = *static_cast<Connection*>(connection);
+  c.out.insert(c.out.end(), bytes, bytes + size);
+}
+
+bool TcpPort::flush(Connection& c) {
+  std::size_t sent = 0;
+  while (sent < c.out.size()) {
+    const ssize_t n = ::send(c.socket.get(), c.out.data() + sent, c.out.size() - sent, MSG_NOSIGNAL);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK) return false;
+    if (n <= 0) break;
+    sent += static_cast<std::size_t>(n);
+  }
+  c.out.erase(c.out.begin(), c.out.begin() + static_cast<std::ptrdiff_t>(sent));
+  return true;
+}
+
+void TcpPort::serve(Connection& c) {
+  std::array<std::uint8_t, 2048> in;
+  // A client that does not read its answers is not read either.
+  for (int k = 0; k < 16 && c.out.size() < most_unsent_bytes; ++k) {
+    const ssize_t n = ::recv(c.socket.get(), in.data(), in.size(), 0);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
+    if (n <= 0) {
+      close(c);
+      return;
+    }
+    c.used = ++clock_;
+    if (!c.stream->receive(in.data(), static_cast<std::size_t>(n))) {
+      flush(c);
+      close(c);
+      return;
+    }
+  }
+  if (!flush(c)) close(c);
+}
+
+void TcpPort::serve() {
+  for (const auto& c : connections_) {
+    if (c->socket) serve(*c);
+  }
+  accept();
+}
+
+std::string TcpPort::text() const { return host::BusAddress{address_}.text(); }
+
+// --- Modbus RTU -------------------------------------------------------------------------------------------------
+
+namespace {
+
+speed_t speed(std::uint32_t baud) {
+  static const std::map<std::uint32_t, speed_t> known = {
+      {1200, B1200},     {2400, B2400},     {4800, B4800},      {9600, B9600},     {19200, B19200},
+      {38400, B38400},   {57600, B57600},   {115200, B115200},  {230400, B230400}, {460800, B460800},
+      {500000, B500000}, {921600, B921600}, {1000000, B1000000}};
+  const auto found = known.find(baud);
+  return found == known.end() ? B0 : found->second;
+}
+
+}  // namespace
+
+Descriptor RtuPort::open() const {
+  Descriptor d(::open(address_.device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (!d) return d;
+  termios t{};
+  if (::tcgetattr(d.get(), &t) != 0) return {};
+  ::cfmakeraw(&t);
+  t.c_cflag = static_cast<tcflag_t>(t.c_cflag & ~static_cast<tcflag_t>(CSTOPB | PARENB | PARODD | CRTSCTS));
+  t.c_cflag |= CLOCAL | CREAD;
+  if (address_.parity != host::Parity::none) t.c_cflag |= PARENB;
+  if (address_.parity == host::Parity::odd) t.c_cflag |= PARODD;
+  t.c_cc[VMIN] = 0;
+  t.c_cc[VTIME] = 0;
+  ::cfsetispeed(&t, speed(address_.baud));
+  ::cfsetospeed(&t, speed(address_.baud));
+  if (::tcsetattr(d.get(), TCSANOW, &t) != 0) return {};
+  ::tcflush(d.get(), TCIOFLUSH);
+  return d;
+}
+
+RtuPort::RtuPort(firmware::Device& device, firmware::Origin origin, const host::ModbusRtuAddress& address)
+    : address_(address), server_(device, origin), line_(server_, address.unit, rtu_gap_us, {this, send}) {
+  if (speed(address.baud) == B0)
+    throw host::BusError(text() + ": a baud rate that serial devices do not have");
+  device_ = open();
+  if (!device_) throw host::BusError(text() + ": " + reason());
+}
+
+void RtuPort::wait_on(std::vector<pollfd>& descriptors) const {
+  if (device_) descriptors.push_back({device_.get(), POLLIN, 0});
+}
+
+void RtuPort::serve() {
+  if (!device_) {
+    if (now_ms() - closed_ms_ < 200) return;
+    closed_ms_ = now_ms();
+    device_ = open();
+    if (!device_) return;
+  }
+  std::array<std::uint8_t, 512> in;
+  for (int k = 0; k < 16; ++k) {
+    const ssize_t n = ::read(device_.get(), in.data(), in.size());
+    if (n > 0) {
+      line_.receive(in.data(), static_cast<std::size_t>(n), now_us());
+      continue;
+    }
+    // With VMIN 0 a silent line reads 0 bytes; a pseudo-terminal whose other end is closed, or an adapter that was
+    // pulled, reads EIO.
+    if (n < 0 && errno != EAGAIN && errno != EINTR) {
+      device_.close();
+      server_.disconnect();
+      closed_ms_ = now_ms();
+    }
+    break;
+  }
+  line_.poll(now_us());
+}
+
+void RtuPort::send(void* self, const std::uint8_t* bytes, std::size_t size) {
+  const int fd = static_cast<RtuPort*>(self)->device_.get();
+  while (size != 0) {
+    const ssize_t n = ::write(fd, bytes, size);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && errno == EAGAIN) {
+      pollfd room{fd, POLLOUT, 0};
+      if (::poll(&room, 1, 100) <= 0) return;
+      continue;
+    }
+    if (n <= 0) return;
+    bytes += n;
+    size -= static_cast<std::size_t>(n);
+  }
+}
+
+std::string RtuPort::text() const { return host::BusAddress{address_}.text(); }
+
+}  // namespace flexcomp::hil

@@ -1,0 +1,106 @@
+/// \file
+/// The buses of the process: what stands between the firmware's servers and the sockets and devices of Linux. Each
+/// port is asked for the descriptors that it waits on and then serves what has come; none of them blocks.
+#ifndef FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
+#define FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
+
+#include <poll.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bus/bus_address.hpp"
+#include "descriptor.hpp"
+#include "flexcomp_firmware/canopen.hpp"
+#include "flexcomp_firmware/modbus.hpp"
+
+namespace flexcomp::hil {
+
+/// Milli- and microseconds of a monotonic clock, wrapping as the firmware expects.
+std::uint32_t now_ms();
+std::uint32_t now_us();
+
+class Port {
+ public:
+  virtual ~Port() = default;
+  virtual void wait_on(std::vector<pollfd>& descriptors) const = 0;
+  virtual void serve() = 0;
+  /// What the `ready` line says of it.
+  virtual std::string text() const = 0;
+};
+
+/// A CANopen node on SocketCAN.
+class CanPort final : public Port {
+ public:
+  /// \throws host::BusError  no such interface, or not allowed
+  CanPort(firmware::Device& device, firmware::Origin origin, const host::CanAddress& address,
+          std::uint16_t heartbeat_ms);
+  void wait_on(std::vector<pollfd>& descriptors) const override;
+  void serve() override;
+  std::string text() const override;
+
+ private:
+  static bool send(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size);
+  host::CanAddress address_;
+  Descriptor socket_;
+  firmware::CanopenNode node_;
+  bool down_ = false;
+};
+
+/// Modbus TCP: a listening socket and a fixed number of connections, each with a server of its own.
+class TcpPort final : public Port {
+ public:
+  /// \throws host::BusError  the address cannot be resolved or listened on
+  TcpPort(firmware::Device& device, firmware::Origin first_origin, const host::ModbusTcpAddress& address);
+  void wait_on(std::vector<pollfd>& descriptors) const override;
+  void serve() override;
+  std::string text() const override;
+
+  static constexpr std::size_t connections = 16;
+
+ private:
+  struct Connection {
+    Connection(firmware::Device& device, firmware::Origin origin) : server(device, origin) {}
+    Descriptor socket;
+    firmware::ModbusServer server;
+    std::unique_ptr<firmware::ModbusTcp> stream;
+    std::vector<std::uint8_t> out;  ///< what the socket did not take yet
+    std::uint64_t used = 0;         ///< when something came last, in requests of the port
+  };
+  static void send(void* connection, const std::uint8_t* bytes, std::size_t size);
+  static bool flush(Connection& c);
+  void accept();
+  void close(Connection& c);
+  void serve(Connection& c);
+
+  host::ModbusTcpAddress address_;
+  Descriptor listener_;
+  std::vector<std::unique_ptr<Connection>> connections_;
+  std::uint64_t clock_ = 0;
+};
+
+/// Modbus RTU on a serial device. A device that goes away (an unplugged adapter) is opened again when it is back.
+class RtuPort final : public Port {
+ public:
+  /// \throws host::BusError  no such device, not a serial device, or a baud rate that it does not have
+  RtuPort(firmware::Device& device, firmware::Origin origin, const host::ModbusRtuAddress& address);
+  void wait_on(std::vector<pollfd>& descriptors) const override;
+  void serve() override;
+  std::string text() const override;
+
+ private:
+  static void send(void* self, const std::uint8_t* bytes, std::size_t size);
+  Descriptor open() const;
+  host::ModbusRtuAddress address_;
+  Descriptor device_;
+  firmware::ModbusServer server_;
+  firmware::ModbusRtu line_;
+  std::uint32_t closed_ms_ = 0;
+};
+
+}  // namespace flexcomp::hil
+
+#endif
