@@ -158,7 +158,10 @@ class Model {
       return Refusal::bad_place;
     if (term.basis == Basis::link_weight) {
       if (!axial_gravity_) return Refusal::mounting;
-      if (!(term.argument > S(term.joint) && term.argument < S(N))) return Refusal::bad_value;
+      // The far point is the origin of a joint farther out, by number.
+      std::size_t far = term.joint + std::size_t{1};
+      while (far < N && !(term.argument == S(static_cast<float>(far)))) ++far;
+      if (far >= N) return Refusal::bad_value;
     }
     if (term.basis == Basis::curve || term.basis == Basis::grid) {
       if (term.table >= table_count_) return Refusal::bad_value;
