@@ -417,9 +417,10 @@ void Store::fail() {
 /// Takes note of a trial that ran out in the cycle.
 void Store::watch_trial() {
   if (state_ != StoreState::trial || !sets_.handover.settled() || !sets_.handover.reverted()) return;
-  // Posting the fallback again changes nothing for the cycle; it makes request and use the same word again.
-  make_active(previous_);
+  // The cycle has changed over by itself, so there is nothing to post.
+  active_ = previous_;
   previous_ = Set{};
+  if (active_.index == Handover::none) faults_ |= wire::fault::no_valid_set;
   faults_ |= wire::fault::trial_reverted;
   finish(Answer::reverted);
 }
