@@ -38,6 +38,7 @@ constexpr std::size_t crc_bytes = 4;
 constexpr std::size_t record_head_bytes = 4;
 constexpr std::size_t term_bytes = 28;
 constexpr std::size_t table_head_bytes = 8;
+constexpr std::size_t max_table_values = 8190;  ///< that a record's 16-bit length can announce
 constexpr std::uint16_t record_term = 1;
 constexpr std::uint16_t record_table = 2;
 constexpr std::uint16_t optional_record = 0x8000;
@@ -66,13 +67,17 @@ inline std::size_t image_size(const TermList<S>& list) {
   return size + list.count * (image::record_head_bytes + image::term_bytes);
 }
 
-/// Writes the image of a list into out; returns its size, or 0 where it does not fit (or a count overflows).
+/// Writes the image of a list into out; returns its size, or 0 where it does not fit, a count
+/// overflows or a table runs out of the list's values.
 /// Of the header only sequence, nominal_hash and name_hash are read.
 template <class S>
 inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& header, std::uint8_t* out,
                                 std::size_t capacity) {
   const std::size_t size = image_size(list);
   if (size > capacity || list.count > 0xFFFF || list.table_count > 0xFFFF) return 0;
+  for (std::size_t k = 0; k < list.table_count; ++k) {
+    if (!has_values(list, list.tables[k]) || list.tables[k].size > image::max_table_values) return 0;
+  }
   for (std::size_t k = 0; k < image::header_bytes; ++k) out[k] = 0;
   out[0] = 'F';
   out[1] = 'L';

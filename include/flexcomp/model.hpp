@@ -214,6 +214,7 @@ class Model {
   Refusal prepare(const NominalRobot<N>& robot, const TermList<S>& list) {
     begin(robot);
     for (std::size_t k = 0; k < list.table_count; ++k) {
+      if (!has_values(list, list.tables[k])) return Refusal::bad_value;
       const Refusal r = add_table(list.tables[k], list.values + list.tables[k].offset);
       if (r != Refusal::none) return r;
     }

@@ -156,6 +156,12 @@ struct TermList {
   std::size_t value_count = 0;
 };
 
+/// True where a table lies within the list's values.
+template <class S>
+constexpr bool has_values(const TermList<S>& list, const Table& table) {
+  return std::size_t{table.offset} + table.size <= list.value_count;
+}
+
 /// True where the basis needs torques, levers or moments, which are taken in the chain without effects.
 constexpr bool needs_loads(Basis b, Factor f) {
   return b == Basis::load_torque || b == Basis::load_torque_cubed || b == Basis::link_weight ||
