@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "flexcomp/robot.hpp"
+#include "files/robot_file.hpp"
 
 namespace flexcomp::host {
 
