@@ -1,15 +1,10 @@
 #include "commands/bus_options.hpp"
 
-#include <fmt/format.h>
-
-#include <nlohmann/json.hpp>
 #include <stdexcept>
-
-#include "files/write_file.hpp"
 
 namespace flexcomp::host {
 
-void BusOptions::add_to(CLI::App& app, const std::string& name) {
+void BusOptions::add_bus_to(CLI::App& app, const std::string& name) {
   app.add_option_function<std::string>(
          name,
          [this, name](const std::string& text) {
@@ -19,16 +14,15 @@ void BusOptions::add_to(CLI::App& app, const std::string& name) {
              throw CLI::ValidationError(name, e.what());
            }
          },
-         "controller: can:IFACE[:NODE], modbus-tcp:HOST[:PORT][:UNIT] or "
-         "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]\n"
-         "(defaults: node 1; port 502, unit 255; 19200 baud, parity E, unit 1)")
+         "Controller: can:IFACE[:NODE], modbus-tcp:HOST[:PORT][:UNIT] or "
+         "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]; "
+         "by default node 1; port 502, unit 255; 19200 baud, parity E, unit 1")
       ->required()
       ->type_name("BUS");
-  app.add_option("--timeout", timeout_s, "how long the controller may keep silent, s")
+  app.add_option("--timeout", timeout_s, "How long the controller may keep silent [s]")
       ->check(CLI::Range(0.05, 3600.0))
       ->capture_default_str();
-  app.add_option("--json", json, "write the result to this file, for programs")->type_name("FILE");
-  app.add_flag("--quiet", quiet, "say nothing but errors");
+  add_to(app);
 }
 
 std::unique_ptr<ControllerClient> BusOptions::connect() const {
@@ -37,12 +31,9 @@ std::unique_ptr<ControllerClient> BusOptions::connect() const {
   return host::connect(bus, options);
 }
 
-void BusOptions::say(const std::string& text) const {
-  if (!quiet) fmt::print("{}\n", text);
-}
-
-void BusOptions::write_json(const nlohmann::ordered_json& result) const {
-  if (!json.empty()) write_file(json, result.dump(2) + "\n");
+void add_optional_robot_option(CLI::App& app, std::string& path) {
+  app.add_option("--robot", path, "Robot file; by default the controller tells which arm it is for")
+      ->type_name("ROBOT.yaml");
 }
 
 }  // namespace flexcomp::host

@@ -5,28 +5,24 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "bus/controller_client.hpp"
+#include "commands/common_options.hpp"
 
 namespace flexcomp::host {
 
-struct BusOptions {
+struct BusOptions : CommonOptions {
   BusAddress bus;
   double timeout_s = 3;
-  std::string json;
-  bool quiet = false;
 
-  /// `name` is --to, --from, --of or --at.
-  void add_to(CLI::App& app, const std::string& name);
+  /// `name` is --to, --from, --of or --at; with --timeout, --json and --quiet.
+  void add_bus_to(CLI::App& app, const std::string& name);
   std::unique_ptr<ControllerClient> connect() const;
-
-  /// Text for people, unless quiet.
-  void say(const std::string& text) const;
-  /// The result as a file, where one is asked for.
-  void write_json(const nlohmann::ordered_json& result) const;
 };
+
+/// --robot, for where the controller does not tell which arm it is for.
+void add_optional_robot_option(CLI::App& app, std::string& path);
 
 }  // namespace flexcomp::host
 

@@ -7,6 +7,7 @@
 #include "bus/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
+#include "commands/commands.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
 #include "files/write_file.hpp"
@@ -55,13 +56,13 @@ struct Pull {
 
 void add_pull(CLI::App& app) {
   auto state = std::make_shared<Pull>();
-  CLI::App* command = app.add_subcommand("pull", "read the active set back from a controller");
-  state->bus.add_to(*command, "--from");
-  command->add_option("-o,--out", state->out, "calibration file to write")->type_name("CAL.yaml");
-  command->add_option("--image", state->image, "write the bytes as they are to this file")->type_name("FILE");
-  command
-      ->add_option("--robot", state->robot, "robot file; by default the controller tells which arm it is for")
-      ->type_name("R.yaml");
+  CLI::App* command = app.add_subcommand("pull", "Read the active set of a controller");
+  state->bus.add_bus_to(*command, "--from");
+  command->add_option("-o,--output", state->out, "Calibration file to write")->type_name("CAL.yaml");
+  command->add_option("--image", state->image, "Write the parameter image, byte for byte, to FILE")
+      ->type_name("FILE");
+  add_optional_robot_option(*command, state->robot);
+  command->footer("Example:\n  flexcomp pull --from modbus-tcp:10.0.0.7 -o active.yaml");
   command->callback([state] { state->run(); });
 }
 

@@ -11,6 +11,7 @@
 #include "bus/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
+#include "commands/commands.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
 #include "files/write_file.hpp"
@@ -102,23 +103,22 @@ void Push::run() const {
 
 void add_push(CLI::App& app) {
   auto state = std::make_shared<Push>();
-  CLI::App* command = app.add_subcommand("push", "send a calibration to a controller");
-  state->bus.add_to(*command, "--to");
-  command->add_option("set", state->set, "calibration file, or a parameter image as pull --image writes it")
+  CLI::App* command = app.add_subcommand(
+      "push", "Send a calibration to a controller: staged, verified, committed, read back and compared");
+  state->bus.add_bus_to(*command, "--to");
+  command->add_option("set", state->set, "Calibration file, or a parameter image as pull --image writes it")
       ->type_name("CAL.yaml");
-  command
-      ->add_option("--robot", state->robot, "robot file; by default the controller tells which arm it is for")
-      ->type_name("R.yaml");
+  add_optional_robot_option(*command, state->robot);
   command->add_option("--sequence", state->sequence,
-                      "number of the set; by default one more than the newest there");
-  command->add_option("--image", state->image, "write the bytes that are sent to this file")
-      ->type_name("FILE");
+                      "Number of the set; by default one more than the newest there");
+  command->add_option("--image", state->image, "Write the bytes that are sent to FILE")->type_name("FILE");
   command
       ->add_option("--trial", state->trial_s,
-                   "on trial: the set before comes back unless confirmed within so many s")
+                   "On trial: the set before comes back unless confirmed within this time [s]")
       ->check(CLI::PositiveNumber);
-  command->add_flag("--confirm", state->confirm, "keep the set that runs on trial");
-  command->add_flag("--allow-unnamed", state->allow_unnamed, "push what was found but not understood, too");
+  command->add_flag("--confirm", state->confirm, "Keep the set that runs on trial; no CAL.yaml then");
+  command->add_flag("--allow-unnamed", state->allow_unnamed, "Also push what was found but not understood");
+  command->footer("Example:\n  flexcomp push --to can:vcan0:5 cal.yaml");
   command->callback([state] { state->run(); });
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/bus_options.hpp"
+#include "commands/commands.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -23,8 +24,9 @@ void run(const BusOptions& bus) {
 
 void add_rollback(CLI::App& app) {
   auto state = std::make_shared<BusOptions>();
-  CLI::App* command = app.add_subcommand("rollback", "return a controller to the set before");
-  state->add_to(*command, "--at");
+  CLI::App* command = app.add_subcommand("rollback", "Return a controller to the set that it had before");
+  state->add_bus_to(*command, "--at");
+  command->footer("Example:\n  flexcomp rollback --at can:vcan0:5");
   command->callback([state] { run(*state); });
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commands/bus_options.hpp"
+#include "commands/commands.hpp"
 #include "files/calibration_file.hpp"
 #include "flexcomp/bytes.hpp"
 
@@ -123,8 +124,9 @@ void run(const BusOptions& bus) {
 
 void add_status(CLI::App& app) {
   auto state = std::make_shared<BusOptions>();
-  CLI::App* command = app.add_subcommand("status", "what a controller is, holds and does");
-  state->add_to(*command, "--of");
+  CLI::App* command = app.add_subcommand("status", "What a controller is, holds and does");
+  state->add_bus_to(*command, "--of");
+  command->footer("Example:\n  flexcomp status --of modbus-rtu:/dev/ttyUSB0:115200:N:3");
   command->callback([state] { run(*state); });
 }
 
