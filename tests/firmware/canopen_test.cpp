@@ -1,0 +1,391 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <optional>
+
+#include "firmware/bench.hpp"
+#include "flexcomp_firmware/canopen.hpp"
+
+namespace flexcomp::firmware::bench {
+namespace {
+
+namespace co = wire::canopen;
+using wire::Answer;
+using wire::Command;
+using Frame = std::array<std::uint8_t, 8>;
+
+struct Sent {
+  std::uint16_t id;
+  Bytes bytes;
+};
+
+class Canopen : public testing::Test {
+ protected:
+  static constexpr std::uint8_t node_id = 5;
+
+  Canopen() { poll(0); }
+
+  void poll(std::uint32_t ms) {
+    arm.now_ms += ms;
+    arm.device->store().poll(arm.now_ms);
+    node.poll(arm.now_ms);
+    arm.step();
+  }
+
+  std::optional<Frame> ask(const Frame& f) {
+    sent.clear();
+    node.receive(co::sdo_request_id + node_id, f.data(), 8);
+    if (sent.empty()) return std::nullopt;
+    EXPECT_EQ(sent.size(), 1U);
+    EXPECT_EQ(sent[0].id, co::sdo_answer_id + node_id);
+    EXPECT_EQ(sent[0].bytes.size(), 8U);
+    Frame out{};
+    std::copy(sent[0].bytes.begin(), sent[0].bytes.end(), out.begin());
+    return out;
+  }
+
+  static Frame head(unsigned command, std::uint16_t index, std::uint8_t sub, std::uint32_t data = 0) {
+    Frame f{};
+    f[0] = static_cast<std::uint8_t>(command);
+    store_u16(f.data() + 1, index);
+    f[3] = sub;
+    store_u32(f.data() + 4, data);
+    return f;
+  }
+
+  /// The abort code of an answer; 0 for any other answer.
+  static std::uint32_t code(const std::optional<Frame>& f) {
+    return f && (*f)[0] == 0x80 ? load_u32(f->data() + 4) : 0;
+  }
+
+  /// Downloads by segments; returns the abort code.
+  std::uint32_t download(std::uint16_t index, std::uint8_t sub, const Bytes& data, bool sized = true) {
+    auto r = ask(head(sized ? 0x21 : 0x20, index, sub, sized ? static_cast<std::uint32_t>(data.size()) : 0));
+    if (code(r) != 0) return code(r);
+    EXPECT_EQ(*r, head(0x60, index, sub));
+    unsigned toggle = 0;
+    for (std::size_t at = 0; at < data.size(); at += 7) {
+      const std::size_t n = std::min<std::size_t>(7, data.size() - at);
+      Frame f{};
+      f[0] = static_cast<std::uint8_t>(toggle | ((7 - n) << 1U) | (at + n == data.size() ? 1U : 0U));
+      std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), n, f.begin() + 1);
+      r = ask(f);
+      if (code(r) != 0) return code(r);
+      EXPECT_EQ(*r, (Frame{static_cast<std::uint8_t>(0x20U | toggle)}));
+      toggle ^= 0x10U;
+    }
+    return 0;
+  }
+
+  std::uint32_t expedited(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) {
+    return code(ask(head(0x23U | ((4 - size) << 2U), index, sub, value)));
+  }
+
+  /// Uploads whatever there is; empty on an abort, whose code is kept.
+  Bytes upload(std::uint16_t index, std::uint8_t sub) {
+    auto r = ask(head(0x40, index, sub));
+    last_code = code(r);
+    if (last_code != 0) return {};
+    if (((*r)[0] & 2U) != 0) return {r->begin() + 4, r->begin() + 8 - (((*r)[0] >> 2U) & 3U)};
+    const std::uint32_t size = load_u32(r->data() + 4);
+    Bytes out;
+    for (unsigned toggle = 0;; toggle ^= 0x10U) {
+      r = ask(Frame{static_cast<std::uint8_t>(0x60U | toggle)});
+      last_code = code(r);
+      if (last_code != 0) return {};
+      EXPECT_EQ((*r)[0] & 0xF0U, toggle);
+      out.insert(out.end(), r->begin() + 1, r->begin() + 8 - (((*r)[0] >> 1U) & 7U));
+      if (((*r)[0] & 1U) != 0) break;
+    }
+    EXPECT_EQ(out.size(), size);
+    return out;
+  }
+
+  std::uint32_t number(std::uint16_t index, std::uint8_t sub) {
+    Bytes b = upload(index, sub);
+    b.resize(4);
+    return load_u32(b.data());
+  }
+
+  std::uint32_t command(Command c, std::uint32_t argument = 0) {
+    expedited(co::command, 1, argument, 4);
+    return expedited(co::command, 2, static_cast<std::uint32_t>(c), 2);
+  }
+
+  wire::Status status() {
+    wire::Status s;
+    wire::decode(upload(co::status, 0).data(), wire::ByteOrder::little, s);
+    return s;
+  }
+
+  Flash flash;
+  Arm arm{flash};
+  std::vector<Sent> sent;
+  bool full = false;
+  std::uint32_t last_code = 0;
+  CanopenNode node{*arm.device,
+                   1,
+                   {node_id, 100, 2000},
+                   {this, [](void* self, std::uint16_t id, const std::uint8_t* b, std::uint8_t n) {
+                      auto& t = *static_cast<Canopen*>(self);
+                      if (t.full) return false;
+                      t.sent.push_back({id, Bytes(b, b + n)});
+                      return true;
+                    }}};
+};
+
+TEST_F(Canopen, BootUpHeartbeatAndNmt) {
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0].id, 0x705);
+  EXPECT_EQ(sent[0].bytes, Bytes{0});
+  const auto beat = [this] {
+    sent.clear();
+    poll(100);
+    return sent.size() == 1 && sent[0].id == 0x705 ? sent[0].bytes[0] : 0xFF;
+  };
+  const auto nmt = [this](std::uint8_t cs, std::uint8_t to) {
+    const std::uint8_t b[2] = {cs, to};
+    node.receive(0, b, 2);
+  };
+  EXPECT_EQ(beat(), 127);
+  nmt(1, 6);
+  EXPECT_EQ(beat(), 127) << "another node";
+  nmt(1, node_id);
+  EXPECT_EQ(beat(), 5);
+  nmt(2, 0);
+  EXPECT_EQ(beat(), 4);
+  EXPECT_FALSE(ask(head(0x40, 0x1000, 0))) << "no SDO when stopped";
+  nmt(128, 0);
+  EXPECT_EQ(beat(), 127);
+  EXPECT_TRUE(ask(head(0x40, 0x1000, 0)));
+  nmt(77, 0);
+  EXPECT_EQ(beat(), 127);
+  expedited(0x1017, 0, 0, 2);
+  sent.clear();
+  poll(10000);
+  EXPECT_TRUE(sent.empty()) << "heartbeat off";
+  for (const std::uint8_t cs : {std::uint8_t{129}, std::uint8_t{130}}) {
+    nmt(cs, node_id);
+    sent.clear();
+    EXPECT_FALSE(ask(head(0x40, 0x1000, 0))) << "not before the boot-up message";
+    poll(1);
+    ASSERT_EQ(sent.size(), 1U);
+    EXPECT_EQ(sent[0].bytes, Bytes{0});
+    EXPECT_EQ(number(0x1017, 0), 100U) << "back to its value at power-on";
+  }
+}
+
+TEST_F(Canopen, MandatoryObjects) {
+  EXPECT_EQ(number(0x1000, 0), 0U);
+  EXPECT_EQ(upload(0x1001, 0), Bytes{1}) << "no set yet";
+  const Bytes name = upload(0x1008, 0);
+  EXPECT_EQ(std::string(name.begin(), name.end()), "flexcomp");
+  EXPECT_EQ(number(0x1018, 0), 4U);
+  EXPECT_EQ(number(0x1018, 4), load_u32(arm.robot.name_hash.data()));
+  EXPECT_EQ(number(0x1200, 1), 0x605U);
+  EXPECT_EQ(number(0x1200, 2), 0x585U);
+  EXPECT_EQ(upload(co::capability, 0).size(), wire::capability_bytes);
+  EXPECT_EQ(upload(co::robot, 0).size(), wire::robot_record_bytes);
+  wire::Capability c;
+  wire::decode(upload(co::capability, 0).data(), wire::ByteOrder::little, c);
+  EXPECT_EQ(c.nominal_hash, nominal_hash(arm.robot));
+  EXPECT_EQ(c.scalar_bytes, sizeof(Scalar));
+}
+
+TEST_F(Canopen, AbortCodes) {
+  EXPECT_EQ(code(ask(head(0x40, 0x3000, 0))), co::abort::no_object);
+  EXPECT_EQ(code(ask(head(0x40, 0x1018, 5))), co::abort::no_sub_index);
+  EXPECT_EQ(code(ask(head(0x40, co::image, 1))), co::abort::write_only);
+  EXPECT_EQ(code(ask(head(0x40, co::image, 2))), co::abort::no_data);
+  EXPECT_EQ(expedited(0x1000, 0, 1, 4), co::abort::read_only);
+  EXPECT_EQ(expedited(0x3000, 0, 1, 4), co::abort::no_object);
+  EXPECT_EQ(expedited(0x1017, 0, 1, 4), co::abort::too_long);
+  EXPECT_EQ(expedited(0x1017, 0, 1, 1), co::abort::too_short);
+  EXPECT_EQ(code(ask(head(0x22, 0x1017, 0, 500))), 0U) << "size not indicated";
+  EXPECT_EQ(number(0x1017, 0), 500U);
+  EXPECT_EQ(expedited(0x1010, 1, 0x11111111, 4), co::abort::not_stored);
+  EXPECT_EQ(expedited(0x1011, 1, 0x11111111, 4), co::abort::not_stored);
+  EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), co::abort::device_state) << "nothing staged";
+  EXPECT_EQ(command(static_cast<Command>(99)), co::abort::value);
+  EXPECT_EQ(command(Command::rollback), co::abort::device_state);
+  EXPECT_EQ(code(ask(head(0xC0, co::image, 1))), co::abort::command) << "block download";
+  EXPECT_EQ(code(ask(head(0xA0, co::image, 2))), co::abort::command) << "block upload";
+  EXPECT_EQ(code(ask(head(0xE0, 0, 0))), co::abort::command);
+  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
+  EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
+  EXPECT_FALSE(ask(head(0x80, 0, 0))) << "an abort is not answered";
+
+  // Toggle.
+  ask(head(0x21, co::image, 1, 100));
+  EXPECT_EQ(code(ask(Frame{0x10})), co::abort::toggle);
+  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "the transfer is over";
+  EXPECT_EQ(arm.device->status().state, 0);
+  ask(head(0x40, co::status, 0));
+  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::toggle);
+
+  // Lengths.
+  EXPECT_EQ(code(ask(head(0x21, co::image, 1, staging_bytes + 1))), co::abort::too_long);
+  EXPECT_EQ(code(ask(head(0x21, co::image, 1, 0))), co::abort::too_short);
+  ask(head(0x21, co::image, 1, 5));
+  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::too_long);
+  ask(head(0x21, co::image, 1, 50));
+  EXPECT_EQ(code(ask(Frame{0x01})), co::abort::too_short);
+  EXPECT_EQ(download(co::image, 1, Bytes(staging_bytes + 1), false), co::abort::too_long);
+  EXPECT_EQ(arm.device->status().state, 0) << "nothing is left behind";
+  EXPECT_EQ(code(ask(head(0x21, co::probe, 1, 215))), co::abort::too_short);
+  EXPECT_EQ(code(ask(head(0x21, co::probe, 1, 217))), co::abort::too_long);
+  EXPECT_EQ(download(co::probe, 1, Bytes(215), false), co::abort::too_short);
+  EXPECT_EQ(download(co::probe, 1, Bytes(600), false), co::abort::too_long);
+
+  // Timeout.
+  ask(head(0x21, co::image, 1, 100));
+  poll(1);
+  sent.clear();
+  poll(2000);
+  ASSERT_FALSE(sent.empty());
+  EXPECT_EQ(sent.back().id, 0x585);
+  EXPECT_EQ(load_u32(sent.back().bytes.data() + 4), co::abort::timeout);
+  EXPECT_EQ(arm.device->status().state, 0);
+}
+
+TEST_F(Canopen, RefusalsOfASet) {
+  const auto refused = [this](const Bytes& image) {
+    EXPECT_EQ(download(co::image, 1, image), 0U);
+    return command(Command::verify);
+  };
+  const Bytes good = make_image(arm.robot, 1);
+  Bytes bad = good;
+  bad[300] ^= 4U;
+  EXPECT_EQ(refused(bad), co::abort::not_stored);
+  Robot other = arm.robot;
+  other.name_hash = name_hash("other", 5);
+  EXPECT_EQ(refused(make_image(other, 1)), co::abort::incompatible);
+  EXPECT_EQ(number(co::status_for_people, 3), static_cast<std::uint32_t>(Refusal::wrong_robot));
+  other = arm.robot;
+  other.links[3].d_m += 1e-9;
+  EXPECT_EQ(refused(make_image(other, 1)), co::abort::incompatible);
+  bad = good;
+  bad[4] = 9;
+  reseal(bad);
+  EXPECT_EQ(refused(bad), co::abort::incompatible) << "schema";
+  EXPECT_EQ(refused(Bytes(good.begin(), good.end() - 4)), co::abort::too_short);
+  bad = good;
+  bad.insert(bad.end(), 4, 0);
+  EXPECT_EQ(refused(bad), co::abort::too_long);
+  EXPECT_EQ(refused(make_image(arm.robot, 1, 1000)), co::abort::value_too_high) << "implausible";
+  EXPECT_EQ(refused(make_image(arm.robot, 0)), co::abort::value_too_low) << "sequence";
+  EXPECT_EQ(arm.stage(good, 2), Answer::accepted);
+  EXPECT_EQ(code(ask(head(0x21, co::image, 1, 100))), co::abort::busy);
+  EXPECT_EQ(command(Command::commit), co::abort::busy);
+  arm.run(Command::abort, 0, 2);
+  EXPECT_EQ(refused(good), 0U);
+}
+
+TEST_F(Canopen, PushPullAndProbe) {
+  const Bytes image = make_image(arm.robot, 5);
+  for (const bool sized : {true, false}) {
+    ASSERT_EQ(download(co::image, 1, image, sized), 0U);
+  }
+  EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), 0U);
+  for (int k = 0; k < 100; ++k) poll(1);
+  EXPECT_EQ(status().active_sequence, 5U);
+  EXPECT_EQ(upload(co::image, 2), image);
+  EXPECT_EQ(upload(0x1001, 0), Bytes{0});
+
+  Joints q = {real(0.1), real(-0.2), real(0.3), real(0.4), real(0.5), real(-0.6)};
+  wire::ProbeRequest request;
+  for (std::size_t j = 0; j < joints; ++j) request.q_rad[j] = to_binary64_bits(q[j]);
+  request = arm.device->with_default_context(request);
+  Bytes record(wire::probe_request_bytes);
+  wire::encode(request, wire::ByteOrder::little, record.data());
+  ASSERT_EQ(download(co::probe, 1, record), 0U);
+  EXPECT_EQ(upload(co::probe, 1), record);
+  wire::ProbeResponse answer;
+  wire::decode(upload(co::probe, 2).data(), wire::ByteOrder::little, answer);
+  const auto expected = by_the_core(arm.robot, image, q, default_context<Scalar>(arm.robot));
+  for (std::size_t j = 0; j < joints; ++j) EXPECT_EQ(answer.q_rad[j], to_binary64_bits(expected.q[j]));
+
+  // A set that changes during an upload ends it.
+  ask(head(0x40, co::image, 2));
+  EXPECT_EQ(code(ask(Frame{0x60})), 0U);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 6, 1, 6)), Answer::accepted);
+  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::device_state);
+
+  EXPECT_EQ(command(Command::rollback), 0U);
+  for (int k = 0; k < 100; ++k) poll(1);
+  EXPECT_EQ(number(co::status_for_people, 5), 5U);
+  EXPECT_EQ(expedited(0x1011, 1, co::load_signature, 4), 0U);
+  for (int k = 0; k < 100; ++k) poll(1);
+  EXPECT_EQ(number(co::status_for_people, 5), 0U);
+}
+
+TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
+  ask(head(0x21, co::image, 1, 100));
+  ask(Frame{0x00});
+  ask(head(0x80, co::image, 1, co::abort::general));
+  EXPECT_EQ(arm.device->status().state, 0);
+  ask(head(0x21, co::image, 1, 100));
+  ask(head(0x40, co::status, 0));  // a new transfer ends the old one
+  EXPECT_EQ(arm.device->status().state, 0);
+  ask(head(0x21, co::image, 1, 100));
+  const std::uint8_t stop[2] = {2, 0};
+  node.receive(0, stop, 2);
+  EXPECT_EQ(arm.device->status().state, 0);
+  // A finished one stays for verify, whatever is read meanwhile.
+  const std::uint8_t start[2] = {1, 0};
+  node.receive(0, start, 2);
+  download(co::image, 1, make_image(arm.robot, 1));
+  upload(co::status, 0);
+  EXPECT_EQ(command(Command::verify), 0U);
+}
+
+TEST_F(Canopen, AnswersThatFoundNoRoomComeLater) {
+  full = true;
+  EXPECT_FALSE(ask(head(0x40, 0x1000, 0)));
+  full = false;
+  sent.clear();
+  poll(1);
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0].id, 0x585);
+}
+
+TEST_F(Canopen, SurvivesMillionsOfBytes) {
+  std::mt19937 engine(11);
+  const auto random = [&engine] { return static_cast<std::uint32_t>(engine()); };
+  const std::uint16_t objects[] = {0x1000, 0x1001, 0x1008, 0x1010, 0x1011, 0x1017, 0x1018, 0x1200, 0x2000,
+                                   0x2001, 0x2002, 0x2003, 0x2010, 0x2011, 0x2020, 0x2021, 0x2FFF};
+  for (int k = 0; k < 400000; ++k) {
+    Frame f;
+    for (auto& b : f) b = static_cast<std::uint8_t>(random());
+    if (random() % 2 != 0) {
+      store_u16(f.data() + 1, objects[random() % 17]);
+      f[3] = static_cast<std::uint8_t>(random() % 9);
+      f[6] = 0;
+      f[7] = 0;
+      if (random() % 2 != 0) f[5] = 0;
+    } else if (random() % 2 != 0) {
+      f[0] = static_cast<std::uint8_t>(f[0] & 0x7EU);
+    }
+    sent.clear();
+    full = random() % 64 == 0;
+    const unsigned what = random() % 64;
+    if (what == 0) {
+      const std::uint8_t nmt[2] = {static_cast<std::uint8_t>(random() % 3 + (random() % 2 != 0 ? 128U : 0U)),
+                                   0};
+      node.receive(0, nmt, 2);
+      const std::uint8_t start[2] = {1, 0};
+      poll(1);
+      node.receive(0, start, 2);
+    } else if (what == 1) {
+      node.receive(static_cast<std::uint16_t>(random() & 0x7FFU), f.data(), random() % 9);
+    } else {
+      node.receive(co::sdo_request_id + node_id, f.data(), 8);
+    }
+    ASSERT_LE(sent.size(), 3U);
+    if (k % 16 == 0) poll(random() % 50);
+  }
+  EXPECT_FALSE(flash.double_writes);
+}
+
+}  // namespace
+}  // namespace flexcomp::firmware::bench
