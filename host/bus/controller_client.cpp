@@ -27,6 +27,22 @@ bool writes_memory(wire::Command command) {
          command == wire::Command::restore_defaults;
 }
 
+/// The status tells the answer to the last command of anybody; whether a command of ours has been carried out is seen
+/// from what it does.
+bool has_happened(wire::Command command, const wire::Status& before, const wire::Status& now) {
+  constexpr auto trial = static_cast<std::uint16_t>(wire::StoreState::trial);
+  const bool other_set = now.active_slot != before.active_slot ||
+                         now.active_sequence != before.active_sequence || now.active_crc != before.active_crc;
+  switch (command) {
+    case wire::Command::confirm:
+      return now.state != trial && !other_set;
+    case wire::Command::restore_defaults:
+      return now.active_slot == wire::no_slot;
+    default:
+      return other_set;
+  }
+}
+
 }  // namespace
 
 std::string describe(wire::Command command) {
@@ -129,17 +145,21 @@ void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress
 
 void ControllerClient::run(wire::Command command, std::uint32_t argument) {
   const std::string what = describe(command);
+  const bool background = writes_memory(command);
+  const wire::Status before = background ? status() : wire::Status();
   insist(what, [&] { send_command(command, argument); });
-  if (!writes_memory(command)) return;
+  if (!background) return;
   const auto end = steady_clock::now() + options_.working;
   for (;;) {
     const wire::Status now = status();
-    const auto answer = static_cast<wire::Answer>(now.answer);
     if (now.state != static_cast<std::uint16_t>(wire::StoreState::working)) {
-      if (answer == wire::Answer::accepted) return;
+      const auto answer = static_cast<wire::Answer>(now.answer);
       const auto refusal = static_cast<Refusal>(now.refusal);
-      throw RefusedByController(fmt::format("{}: asked to {}, the controller failed: {}", where_, what,
-                                            describe(answer, refusal, now.detail)),
+      if (has_happened(command, before, now)) return;
+      const std::string why = answer == wire::Answer::accepted
+                                  ? "nothing has changed, and the reason is overtaken by another client"
+                                  : describe(answer, refusal, now.detail);
+      throw RefusedByController(fmt::format("{}: asked to {}, the controller failed: {}", where_, what, why),
                                 answer, refusal);
     }
     if (steady_clock::now() > end) {
@@ -211,7 +231,8 @@ void ControllerClient::explain(const std::string& what, const SaidNo& no) {
   }
   const auto answer = static_cast<wire::Answer>(now.answer);
   const auto refusal = static_cast<Refusal>(now.refusal);
-  const bool told = now.answer != 0xFFFF && answer != wire::Answer::accepted;
+  // An answer that does not fit is the one to another client's command, given in between.
+  const bool told = now.answer != 0xFFFF && answer != wire::Answer::accepted && answer != wire::Answer::busy;
   if (no.busy) {
     throw RefusedByController(
         fmt::format("{}: asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",

@@ -33,6 +33,7 @@ struct Controller {
   int busy = 0;           ///< so many commands are answered busy
   int working_polls = 0;  ///< so many status records say that memory is being written
   bool damages_image = false;
+  bool overtaken = false;  ///< another client's command is answered before ours is looked at
 
   Controller() {
     robot.links[1].a_m = 0.4;
@@ -77,7 +78,7 @@ struct Controller {
           status.active_bytes = static_cast<std::uint32_t>(active.size());
           ++status.active_sequence;
         }
-        answer(commit_ends);
+        answer(overtaken ? Answer::busy : commit_ends);
         return Answer::accepted;
       case wire::Command::abort:
         staged.clear();

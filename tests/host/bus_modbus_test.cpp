@@ -261,6 +261,16 @@ TEST_P(ModbusClient, SaysWhatFailedInTheBackground) {
   }
 }
 
+TEST_P(ModbusClient, JudgesACommitByWhatItDid) {
+  Server server(GetParam());
+  server.device.overtaken = true;
+  const auto client = connect(server.address(), quick());
+  push_image(*client, numbered_bytes(100));
+  EXPECT_EQ(server.device.active.size(), 100U);
+  server.device.commit_ends = wire::Answer::wrong_state;
+  EXPECT_THROW(push_image(*client, numbered_bytes(100)), RefusedByController);
+}
+
 TEST_P(ModbusClient, FindsADamagedSet) {
   Server server(GetParam());
   server.device.damages_image = true;
