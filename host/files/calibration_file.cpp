@@ -321,6 +321,23 @@ void read_head(const YamlField& root, const RobotFile& robot, Calibration& c) {
     if (const auto f = field->find("f")) c.frames->f = read_frame(*f);
     if (const auto e = field->find("e")) c.frames->e = read_frame(*e);
   }
+  if (const auto field = root.find("covariance_factor")) {
+    CovarianceFactor covariance;
+    const std::vector<YamlField> rows = field->items();
+    const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
+    covariance.factor = Eigen::MatrixXd::Zero(n, n);
+    for (Eigen::Index r = 0; r < n; ++r) {
+      const YamlField& row = rows[static_cast<std::size_t>(r)];
+      row.require_keys({"parameter", "row"});
+      covariance.parameters.push_back(row.at("parameter").text());
+      const std::vector<YamlField> values = row.at("row").items();
+      if (static_cast<Eigen::Index>(values.size()) != r + 1)
+        throw row.error(fmt::format("{} numbers: a lower triangle", r + 1), fmt::format("{}", values.size()));
+      for (Eigen::Index k = 0; k <= r; ++k)
+        covariance.factor(r, k) = values[static_cast<std::size_t>(k)].number(unit::si);
+    }
+    c.covariance = std::move(covariance);
+  }
   if (const auto field = root.find("confounded")) {
     for (const YamlField& entry : field->items()) {
       entry.require_keys({"parameter", "with"});
@@ -474,7 +491,7 @@ void stamp(Calibration& calibration, const RobotFile& robot) {
 Calibration load_calibration(const std::string& path, const RobotFile& robot) {
   const YamlField root = YamlField::load(path);
   root.require_keys({"robot", "nominal_hash", "flexcomp_version", "date", "sequence", "frames", "geometric",
-                     "base", "tool", "effects", "confounded", "residuals"});
+                     "base", "tool", "effects", "confounded", "residuals", "covariance_factor"});
   Calibration calibration;
   calibration.path = path;
   read_head(root, robot, calibration);
@@ -522,6 +539,16 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   if (!c.residuals.empty()) text += "residuals:\n";
   for (const auto& [key, value] : c.residuals)
     text += fmt::format("  {}: {}\n", key, number(value, unit::si));
+  if (c.covariance) {
+    text += "covariance_factor:  # covariance = factor * factor^T, SI units (m, rad, rad/(N m)); lower triangle\n";
+    for (Eigen::Index r = 0; r < c.covariance->factor.rows(); ++r) {
+      std::vector<std::string> row;
+      for (Eigen::Index k = 0; k <= r; ++k)
+        row.push_back(yaml_number(fmt::format("{:.9g}", c.covariance->factor(r, k))));
+      text += fmt::format("  - {{parameter: {}, row: [{}]}}\n",
+                          quoted(c.covariance->parameters[static_cast<std::size_t>(r)]), fmt::join(row, ", "));
+    }
+  }
   return text;
 }
 

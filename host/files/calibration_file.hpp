@@ -39,6 +39,13 @@ struct Confounded {
   std::vector<std::string> with;  ///< and is carried by these
 };
 
+/// Joint uncertainty of all that was fitted (frames first): covariance = factor * factor^T, SI. The standard deviations
+/// alone would not do: what two near-confounded parameters lack in common cancels in the pose that they predict.
+struct CovarianceFactor {
+  std::vector<std::string> parameters;  ///< frame_f.x_mm … frame_e.rz_deg, then parameters by name
+  Eigen::MatrixXd factor;               ///< lower triangular, one row per parameter
+};
+
 struct Calibration {
   std::string path;   ///< as given, for messages
   std::string robot;  ///< name; empty in a truth file that leaves it out
@@ -48,6 +55,7 @@ struct Calibration {
       sigma;  ///< standard deviation per term in SI, NaN where none; may be shorter than terms
   std::vector<double> value_sigma;          ///< the same per value of the tables
   std::optional<MeasurementFrames> frames;  ///< where fitted; the base is then not pushed
+  std::optional<CovarianceFactor> covariance;
   std::vector<Confounded> confounded;
   std::vector<std::pair<std::string, double>> residuals;  ///< by name with unit, e.g. after_mean_mm
   std::string tool_version;

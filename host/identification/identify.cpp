@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "files/input_error.hpp"
@@ -64,42 +65,6 @@ void refuse_the_implausible(const RobotFile& robot, const std::vector<Observatio
                    fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
 }
 
-/// Greedy choice among random poses: each adds the most information about what is still unknown.
-std::vector<std::array<double, joint_count>> poses_that_cure(const Eigen::MatrixXd& data,
-                                                             const Eigen::MatrixXd& candidates,
-                                                             const std::vector<Observation>& candidate_rows) {
-  const Eigen::Index columns = data.cols();
-  // A weak prior of 100 units stands in for what the data do not know.
-  Eigen::MatrixXd covariance =
-      (data.transpose() * data + 1e-4 * Eigen::MatrixXd::Identity(columns, columns)).inverse();
-  std::vector<std::array<double, joint_count>> chosen;
-  std::set<Eigen::Index> taken;
-  const Eigen::Index count = static_cast<Eigen::Index>(std::min<std::size_t>(candidate_rows.size(), 300));
-  for (int k = 0; k < 40; ++k) {
-    if (covariance.diagonal().maxCoeff() < 100) break;
-    double best = -1;
-    Eigen::Index which = 0;
-    for (Eigen::Index c = 0; c < count; ++c) {
-      if (taken.count(c) != 0) continue;
-      const auto h = candidates.middleRows<6>(6 * c);
-      const Eigen::Matrix<double, 6, 6> gain =
-          Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
-      const double information = gain.llt().matrixLLT().diagonal().array().log().sum();
-      if (information > best) {
-        best = information;
-        which = c;
-      }
-    }
-    taken.insert(which);
-    const Eigen::MatrixXd h = candidates.middleRows<6>(6 * which);
-    const Eigen::MatrixXd ch = covariance * h.transpose();
-    const Eigen::MatrixXd gain = Eigen::MatrixXd::Identity(6, 6) + h * ch;
-    covariance -= ch * gain.ldlt().solve(ch.transpose());
-    chosen.push_back(candidate_rows[static_cast<std::size_t>(which)].q_rad);
-  }
-  return chosen;
-}
-
 Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>& columns) {
   Eigen::MatrixXd out(m.rows(), static_cast<Eigen::Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -147,6 +112,54 @@ std::vector<std::size_t> drop_the_unknowable(const Eigen::MatrixXd& data, const 
     kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(worst));
   }
   return dropped;
+}
+
+/// Whether rows know every one of these columns well enough.
+bool knows_all(const Eigen::MatrixXd& data, const Eigen::MatrixXd& reference, std::size_t frames) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(data.cols()));
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> kept = eliminate(data, order).kept;
+  return kept.size() == order.size() && drop_the_unknowable(data, reference, order, frames, kept).empty();
+}
+
+/// Greedy choice among the random poses of the reference until all columns are known: each adds the most information
+/// about what is still unknown (D-optimal, by rank-six updates).
+std::vector<std::array<double, joint_count>> poses_that_cure(Eigen::MatrixXd data,
+                                                             const Eigen::MatrixXd& reference,
+                                                             const std::vector<Observation>& reference_rows,
+                                                             std::size_t frames) {
+  constexpr std::size_t most = 40;
+  constexpr Eigen::Index candidates = 300;
+  const Eigen::Index columns = data.cols();
+  // A weak prior of 100 units stands in for what the data do not know.
+  Eigen::MatrixXd covariance =
+      (data.transpose() * data + 1e-4 * Eigen::MatrixXd::Identity(columns, columns)).inverse();
+  std::vector<std::array<double, joint_count>> chosen;
+  std::set<Eigen::Index> taken;
+  while (chosen.size() < most && !knows_all(data, reference, frames)) {
+    double best = -1;
+    Eigen::Index which = 0;
+    for (Eigen::Index c = 0; c < candidates; ++c) {
+      if (taken.count(c) != 0) continue;
+      const auto h = reference.middleRows<6>(6 * c);
+      const Eigen::Matrix<double, 6, 6> gain =
+          Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
+      const double information = gain.llt().matrixLLT().diagonal().array().log().sum();
+      if (information > best) {
+        best = information;
+        which = c;
+      }
+    }
+    taken.insert(which);
+    const Eigen::MatrixXd h = reference.middleRows<6>(6 * which);
+    const Eigen::MatrixXd ch = covariance * h.transpose();
+    const Eigen::MatrixXd gain = Eigen::MatrixXd::Identity(6, 6) + h * ch;
+    covariance -= ch * gain.ldlt().solve(ch.transpose());
+    data.conservativeResize(data.rows() + 6, Eigen::NoChange);
+    data.bottomRows<6>() = h;
+    chosen.push_back(reference_rows[static_cast<std::size_t>(which)].q_rad);
+  }
+  return chosen;
 }
 
 /// Terms that no kept parameter drives say nothing: they are left out of the calibration.
@@ -248,8 +261,11 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
 
   const Eigen::VectorXd sigma_units = out.fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   if (!out.missing.empty()) {
-    out.cure = poses_that_cure(select(data_matrix, possible.kept), select(reference_matrix, possible.kept),
-                               reference);
+    // In the order of preference, so that the same columns are judged here as above; frames stand first in it.
+    out.cure = poses_that_cure(
+        select(data_matrix, possible_order), select(reference_matrix, possible_order), reference,
+        static_cast<std::size_t>(std::count_if(possible_order.begin(), possible_order.end(),
+                                               [&](std::size_t c) { return c < all.frames.size(); })));
   }
 
   const Eigen::VectorXd& s = out.fit.singular_values;
@@ -267,6 +283,8 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
 
   const Eigen::VectorXd units = units_of(fitted, out.fit.estimate.set);
   keep_what_was_identified(out.calibration, out.fit.estimate.set, fitted, sigma_units.cwiseProduct(units));
+  out.calibration.covariance = CovarianceFactor{
+      names_of(fitted), units.asDiagonal() * Eigen::MatrixXd(out.fit.covariance.llt().matrixL())};
   if (fit_frames_too) {
     out.calibration.frames = MeasurementFrames{Frame::of(out.fit.estimate.f), Frame::of(out.fit.estimate.e)};
   } else {

@@ -2,7 +2,49 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "files/input_error.hpp"
+
 namespace flexcomp::host {
+
+namespace {
+
+/// r^T (1 + A A^T)^-1 r with A = whitened derivative * covariance factor, without forming the large matrix (Woodbury).
+double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& model,
+                                   const std::vector<Observation>& rows, const Calibration& calibration,
+                                   const RobotFile& robot) {
+  const CovarianceFactor& covariance = *calibration.covariance;
+  Unknowns unknowns;
+  Unknowns every_frame;
+  every_frame.frames = free_frames(rows);
+  const std::vector<std::string> frame_names = names_of(every_frame);
+  const std::vector<Parameter> parameters = parameters_of(calibration.terms, robot.nominal);
+  for (const std::string& name : covariance.parameters) {
+    const auto frame = std::find(frame_names.begin(), frame_names.end(), name);
+    const auto parameter = std::find_if(parameters.begin(), parameters.end(),
+                                        [&](const Parameter& p) { return p.name == name; });
+    if (frame != frame_names.end()) {
+      unknowns.frames.push_back(every_frame.frames[static_cast<std::size_t>(frame - frame_names.begin())]);
+    } else if (parameter != parameters.end()) {
+      unknowns.parameters.push_back(*parameter);
+    } else if (name.rfind("frame_", 0) !=
+               0) {  // a frame's angle that positions do not see may be absent here
+      throw InputError(calibration.path, 0, "covariance_factor", "names of parameters of this file", name);
+    }
+  }
+  const Linearised lin = linearised(estimate, model, rows, unknowns);
+  if (static_cast<std::size_t>(covariance.factor.rows()) != unknowns.count())
+    return lin.residual.squaredNorm();
+  const Eigen::VectorXd units = units_of(unknowns, estimate.set);
+  const Eigen::MatrixXd a = lin.derivative * (units.cwiseInverse().asDiagonal() * covariance.factor);
+  const Eigen::VectorXd ar = a.transpose() * lin.residual;
+  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(a.cols(), a.cols()) + a.transpose() * a;
+  return lin.residual.squaredNorm() - ar.dot(inner.llt().solve(ar));
+}
+
+}  // namespace
 
 Validation validate(const RobotFile& robot, const Calibration& calibration,
                     const std::vector<Observation>& rows, const std::string& source) {
@@ -20,7 +62,8 @@ Validation validate(const RobotFile& robot, const Calibration& calibration,
   const auto model = prepare(estimate.set, robot, calibration.path);
   out.residuals = residuals(estimate, *model, rows);
   out.after = statistics(out.residuals, rows);
-  out.chi2 = chi_square(out.residuals, rows);
+  out.chi2 = calibration.covariance ? chi_square_with_uncertainty(estimate, *model, rows, calibration, robot)
+                                    : chi_square(out.residuals, rows);
   out.degrees_of_freedom = measured_numbers(rows);
 
   const ErrorStatistics& before =
