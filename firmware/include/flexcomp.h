@@ -1,19 +1,19 @@
 /* flexcomp for C controllers (C99; C90 with <stdint.h>).
  *
- * The controller's control cycle gives a joint command and gets back the command that brings the real, flexible arm
- * to the pose that the nominal arm would have. Parameter sets come in over CANopen or Modbus, are checked, kept in
- * two slots of non-volatile memory and faded in.
+ * The controller's control cycle gives a joint command and gets back the command that brings the real,
+ * flexible arm to the pose that the nominal arm would have. Parameter sets come in over CANopen or Modbus,
+ * are checked, kept in two slots of non-volatile memory and faded in.
  *
- * Memory. All of it is the caller's: one block per object, of the size that a constant names, aligned to 8 bytes
- * (flexcomp_memory and its like are such blocks). Nothing is allocated, nothing is static.
+ * Memory. All of it is the caller's: one block per object, of the size that a constant names, aligned to 8
+ * bytes (flexcomp_memory and its like are such blocks). Nothing is allocated, nothing is static.
  *
- * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step and nothing
- * else; it may interrupt the other one at any point and never waits. The BACKGROUND context (main loop, or one thread)
- * calls everything else; two calls of it must not overlap. Hooks are called in the background, from within the call
- * that needs them.
+ * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step and
+ * nothing else; it may interrupt the other one at any point and never waits. The BACKGROUND context (main
+ * loop, or one thread) calls everything else; two calls of it must not overlap. Hooks are called in the
+ * background, from within the call that needs them.
  *
- * Units: SI (rad, m, kg, N, s), temperature in deg C. Reals are flexcomp_real, the scalar that the library is built
- * for (FLEXCOMP_SCALAR); the robot's geometry is always double, as its hash is taken of it.
+ * Units: SI (rad, m, kg, N, s), temperature in deg C. Reals are flexcomp_real, the scalar that the library is
+ * built for (FLEXCOMP_SCALAR); the robot's geometry is always double, as its hash is taken of it.
  *
  *     static flexcomp_memory memory;
  *     flexcomp_arm *fc = flexcomp_init(&memory, sizeof memory, &robot, NULL, &storage);
@@ -37,7 +37,7 @@ extern "C" {
 
 typedef FLEXCOMP_SCALAR flexcomp_real;
 
-/* --- memory ---------------------------------------------------------------------------------------------------- */
+/* --- memory -------------------------------------------------------------------------------------- */
 
 /* One prepared parameter set; there are two. */
 #define FLEXCOMP_SET_BYTES                                                                                  \
@@ -77,7 +77,7 @@ typedef struct flexcomp_can flexcomp_can; /* a CANopen node on it */
 typedef struct flexcomp_rtu flexcomp_rtu; /* a Modbus serial line on it */
 typedef struct flexcomp_tcp flexcomp_tcp; /* a Modbus TCP connection on it */
 
-/* --- the robot ------------------------------------------------------------------------------------------------- */
+/* --- the robot ----------------------------------------------------------------------------------- */
 
 /* Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta); theta is added to the joint reading. */
 typedef struct flexcomp_link {
@@ -105,7 +105,7 @@ typedef struct flexcomp_robot {
 /* No links, limits of two turns, gravity (0, 0, -9.8), tool at the flange, no payload, 20 deg C. */
 void flexcomp_robot_default(flexcomp_robot* robot);
 
-/* --- settings -------------------------------------------------------------------------------------------------- */
+/* --- settings ------------------------------------------------------------------------------------ */
 
 typedef enum flexcomp_on_refusal {
   FLEXCOMP_PASS_THROUGH = 0,        /* the correction fades out to zero */
@@ -127,7 +127,7 @@ typedef struct flexcomp_settings {
 /* 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 1000, 60000, 30000 ms, 1000 us, FLEXCOMP_PASS_THROUGH. */
 void flexcomp_settings_default(flexcomp_settings* settings);
 
-/* --- non-volatile memory --------------------------------------------------------------------------------------- */
+/* --- non-volatile memory ------------------------------------------------------------------------- */
 
 typedef enum flexcomp_storage_result {
   FLEXCOMP_STORAGE_FAILED = -1,
@@ -135,11 +135,12 @@ typedef enum flexcomp_storage_result {
   FLEXCOMP_STORAGE_BUSY = 1 /* erase and write only: under way, the same call comes again at the next poll */
 } flexcomp_storage_result;
 
-/* Two slots, 0 and 1, of FLEXCOMP_SLOT_BYTES each. Called in the background. Any hook may be NULL: then nothing is kept
- * and every commit is refused. Power may fail within any call.
+/* Two slots, 0 and 1, of FLEXCOMP_SLOT_BYTES each. Called in the background. Any hook may be NULL: then nothing
+ * is kept and every commit is refused. Power may fail within any call.
  * read: `size` bytes from `offset`; bytes never written may read as anything. Never busy.
- * erase: makes a whole slot writable. write: `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of
- * 32) of an erased slot, each byte once between two erases; done means that they survive a power loss. */
+ * erase: makes a whole slot writable. write: `size` bytes (a multiple of 32, at most 256) at `offset` (a
+ * multiple of 32) of an erased slot, each byte once between two erases; done means that they survive a power
+ * loss. */
 typedef struct flexcomp_storage {
   void* user;
   flexcomp_storage_result (*read)(void* user, unsigned slot, uint32_t offset, uint8_t* to, uint32_t size);
@@ -148,16 +149,17 @@ typedef struct flexcomp_storage {
                                    uint32_t size);
 } flexcomp_storage;
 
-/* --- one arm --------------------------------------------------------------------------------------------------- */
+/* --- one arm ------------------------------------------------------------------------------------- */
 
-/* Builds an arm in `memory`. `settings` and `storage` may be NULL: defaults, and no non-volatile memory. All is copied.
- * NULL where the memory is too small or misaligned, or the robot is not sensible: a number that is not finite,
- * crossed limits, a quaternion off norm 1 by more than 1e-3, no name. BACKGROUND. */
+/* Builds an arm in `memory`. `settings` and `storage` may be NULL: defaults, and no non-volatile memory. All is
+ * copied. NULL where the memory is too small or misaligned, or the robot is not sensible: a number that is not
+ * finite, crossed limits, a quaternion off norm 1 by more than 1e-3, no name. BACKGROUND. */
 flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
                             const flexcomp_settings* settings, const flexcomp_storage* storage);
 
 /* Loads the set from storage: the highest valid sequence, else the other one, else none. Once, before the cycle
- * starts. Returns the fault bits of flexcomp_state. BACKGROUND; the time of two images' reading and checking. */
+ * starts. Returns the fault bits of flexcomp_state. BACKGROUND; the time of two images' reading and checking.
+ * */
 unsigned flexcomp_boot(flexcomp_arm* fc);
 
 /* What the joints carry, in one control cycle. */
@@ -184,15 +186,15 @@ typedef enum flexcomp_status {
 } flexcomp_status;
 
 /* One control cycle: joint command (rad) in, corrected joint command (rad) out; the two may be the same array.
- * `context` may be NULL: the default one. Directions of motion are tracked from the commands. Bounded work on any
- * input, no waiting. Where a set changes, the command moves by at most 1.5 / fade_cycles of the difference per
- * cycle. CYCLE. */
+ * `context` may be NULL: the default one. Directions of motion are tracked from the commands. Bounded work on
+ * any input, no waiting. Where a set changes, the command moves by at most 1.5 / fade_cycles of the
+ * difference per cycle. CYCLE. */
 flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]);
 
-/* Goes on with what is under way (writing a slot, trials, timeouts); at most one storage call. Every 10 ms or so. now_ms
- * is any clock that wraps at 32 bits. BACKGROUND. */
+/* Goes on with what is under way (writing a slot, trials, timeouts); at most one storage call. Every 10 ms or so.
+ * now_ms is any clock that wraps at 32 bits. BACKGROUND. */
 void flexcomp_poll(flexcomp_arm* fc, uint32_t now_ms);
 
 /* What the parameter store and the cycle are doing. */
@@ -224,13 +226,13 @@ const char* flexcomp_answer_text(unsigned answer);
 const char* flexcomp_refusal_text(unsigned refusal);
 const char* flexcomp_version(void);
 
-/* --- CANopen (CiA 301) ----------------------------------------------------------------------------------------- */
+/* --- CANopen (CiA 301) --------------------------------------------------------------------------- */
 
 /* Sends a data frame with an 11-bit identifier. 0 where there is no room now; it is offered again. */
 typedef int (*flexcomp_can_send)(void* user, uint16_t id, const uint8_t* bytes, uint8_t size);
 
-/* A node (1 ... 127) with this heartbeat time (ms, 0: none) in `memory` of FLEXCOMP_CAN_BYTES. NULL where an argument is
- * out of range. BACKGROUND, like all that follows. */
+/* A node (1 ... 127) with this heartbeat time (ms, 0: none) in `memory` of FLEXCOMP_CAN_BYTES. NULL where an
+ * argument is out of range. BACKGROUND, like all that follows. */
 flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, unsigned node,
                                 uint16_t heartbeat_ms, flexcomp_can_send send, void* user);
 /* A data frame with an 11-bit identifier from the bus; any may be given. */
@@ -238,13 +240,13 @@ void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, 
 /* Every few milliseconds. */
 void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms);
 
-/* --- Modbus ---------------------------------------------------------------------------------------------------- */
+/* --- Modbus -------------------------------------------------------------------------------------- */
 
 /* Sends bytes; called at most once per request. */
 typedef void (*flexcomp_send)(void* user, const uint8_t* bytes, size_t size);
 
-/* RTU: unit 1 ... 247. gap_us is the silence after which the line is taken as back in step: 1750 where bytes are seen as
- * they come, more where they come in bursts. The receiver must be off while sending. */
+/* RTU: unit 1 ... 247. gap_us is the silence after which the line is taken as back in step: 1750 where bytes are
+ * seen as they come, more where they come in bursts. The receiver must be off while sending. */
 flexcomp_rtu* flexcomp_rtu_init(void* memory, size_t size, flexcomp_arm* fc, unsigned unit, uint32_t gap_us,
                                 flexcomp_send send, void* user);
 void flexcomp_rtu_receive(flexcomp_rtu* rtu, const uint8_t* bytes, size_t size, uint32_t now_us);

@@ -1,5 +1,5 @@
-/* What is fixed when the library is built; C and C++. Whoever includes it must see the values with which the library
- * was compiled, so set them for the whole build, not beside one include. */
+/* What is fixed when the library is built; C and C++. Whoever includes it must see the values with which the
+ * library was compiled, so set them for the whole build, not beside one include. */
 #ifndef FLEXCOMP_CONFIG_H
 #define FLEXCOMP_CONFIG_H
 
@@ -8,7 +8,7 @@
 #define FLEXCOMP_SCALAR double
 #endif
 
-/* How much a parameter set may hold: terms that are not constant (constant ones cost nothing), tables, values. */
+/* How much a parameter set may hold: terms that are not constant (constant ones are free), tables, values. */
 #ifndef FLEXCOMP_TERMS
 #define FLEXCOMP_TERMS 64
 #endif

@@ -139,7 +139,7 @@ void CanopenNode::abort(std::uint32_t code) {
   reply(frame);
 }
 
-// --- network management -----------------------------------------------------------------------------------------
+// --- network management -------------------------------------------------------------------------------
 
 void CanopenNode::nmt(std::uint8_t command) {
   switch (static_cast<co::NmtCommand>(command)) {
@@ -155,8 +155,8 @@ void CanopenNode::nmt(std::uint8_t command) {
       break;
     case co::NmtCommand::reset_node:
     case co::NmtCommand::reset_communication:
-      // Both reset the node's communication. The control cycle goes on: an arm must not lose its compensation because
-      // somebody restarts the network.
+      // Both reset the node's communication. The control cycle goes on: an arm must not lose its compensation
+      // because somebody restarts the network.
       reset();
       break;
   }
@@ -199,7 +199,7 @@ void CanopenNode::poll(std::uint32_t now_ms) {
   }
 }
 
-// --- SDO server -------------------------------------------------------------------------------------------------
+// --- SDO server ---------------------------------------------------------------------------------------
 
 void CanopenNode::request(const std::uint8_t* frame) {
   touched_ = true;
@@ -401,7 +401,7 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
   reply(answer);
 }
 
-// --- objects ----------------------------------------------------------------------------------------------------
+// --- objects ------------------------------------------------------------------------------------------
 
 std::uint32_t CanopenNode::command(wire::Command command, std::uint32_t argument) {
   return code_of(device_.store().run(command, argument, origin_));

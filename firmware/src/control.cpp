@@ -37,8 +37,8 @@ ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const Contro
   if (settings_.direction_band_rad > Scalar(0)) band_inverse_ = Scalar(2) / settings_.direction_band_rad;
 }
 
-// A joint's direction follows its command like a body with friction that is dragged along (the stop operator of
-// hysteresis): it moves with the command between -1 and +1 and stays at the end that it has reached.
+// A joint's direction follows its command like a body with friction that is dragged along (the stop operator
+// of hysteresis): it moves with the command between -1 and +1 and stays at the end that it has reached.
 void ControlCycle::track(const Joints& q) {
   if (!tracking_) {
     last_command_ = q;

@@ -104,8 +104,8 @@ Can& can_of(flexcomp_can* can) { return *reinterpret_cast<Can*>(can); }
 Rtu& rtu_of(flexcomp_rtu* rtu) { return *reinterpret_cast<Rtu*>(rtu); }
 Tcp& tcp_of(flexcomp_tcp* tcp) { return *reinterpret_cast<Tcp*>(tcp); }
 
-/// The geometry is double on every target, and the M4F has no double arithmetic: it is looked at as bits, or as the
-/// target's scalar.
+/// The geometry is double on every target, and the M4F has no double arithmetic: it is looked at as bits, or
+/// as the target's scalar.
 fw::Scalar scalar(double v) { return flexcomp::from_binary64<fw::Scalar>(v); }
 
 bool take_robot(const flexcomp_robot& from, fw::Robot& to) {

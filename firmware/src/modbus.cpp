@@ -318,7 +318,8 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
       return 5;
     }
     case diagnostics: {
-      // Sub-function 00, Return Query Data; the others are counters of a serial line that this server does not keep.
+      // Sub-function 00, Return Query Data; the others are counters of a serial line that this server does
+      // not keep.
       if (size < 3) return refuse(function, Exception::illegal_data_value, out);
       if (be16(request + 1) != 0) return refuse(function, Exception::illegal_function, out);
       if (size > map::pdu_bytes) return refuse(function, Exception::illegal_data_value, out);
@@ -384,7 +385,7 @@ void ModbusServer::disconnect() {
   probe_response_ = {};
 }
 
-// --- RTU --------------------------------------------------------------------------------------------------------
+// --- RTU ----------------------------------------------------------------------------------------------
 
 std::uint16_t modbus_crc(const std::uint8_t* bytes, std::size_t size, std::uint16_t crc) {
   static const std::uint16_t nibble[16] = {0x0000, 0xCC01, 0xD801, 0x1400, 0xF001, 0x3C00, 0x2800, 0xE401,
@@ -483,7 +484,7 @@ void ModbusRtu::poll(std::uint32_t now_us) {
   if ((size_ != 0 || lost_) && now_us - last_us_ >= gap_us_) gap();
 }
 
-// --- TCP --------------------------------------------------------------------------------------------------------
+// --- TCP ----------------------------------------------------------------------------------------------
 
 bool ModbusTcp::receive(const std::uint8_t* bytes, std::size_t size) {
   constexpr std::size_t header = 7;

@@ -23,11 +23,11 @@ constexpr std::uint32_t shortest_image = image::header_bytes + image::crc_bytes;
 
 std::uint32_t rounded_up(std::uint32_t size) { return (size + unit_bytes - 1U) / unit_bytes * unit_bytes; }
 
-/// Joint readings spread evenly over the limits: multiples of an irrational number per joint (Roberts' R6 sequence)
-/// in 32-bit integers, so that every target takes the same poses.
+/// Joint readings spread evenly over the limits: multiples of g^-1 … g^-6 with
+/// g^7 = g + 1 (Roberts' sequence), in 32-bit integers, so that every target takes the same poses.
 Scalar spread(std::uint32_t pose, std::size_t joint) {
-  constexpr std::uint32_t step[joints] = {0xE41F1F87U, 0xCB4B4E5BU, 0xB5297A4DU,
-                                          0xA1770F33U, 0x8FE3A4A7U, 0x8038F2C1U};
+  constexpr std::uint32_t step[joints] = {0xE60E2B73U, 0xCEBD76D9U, 0xB9C9AA3BU,
+                                          0xA6F5777FU, 0x9609C71FU, 0x86D516E5U};
   return static_cast<Scalar>((pose * step[joint]) >> 8U) * Scalar(1.0F / 16777216.0F);
 }
 
@@ -79,7 +79,7 @@ void Store::release() {
   state_ = StoreState::idle;
 }
 
-// --- start ----------------------------------------------------------------------------------------------------
+// --- start --------------------------------------------------------------------------------------------
 
 bool Store::read_seal(unsigned slot, Set& set) {
   std::uint8_t seal[seal_bytes];
@@ -126,7 +126,8 @@ void Store::boot() {
     if (!sealed[slot]) continue;
     Set& set = found[slot];
     if (active_.index != Handover::none) {
-      // The other slot is only asked whether a rollback could use it; its model is prepared when it is needed.
+      // The other slot is only asked whether a rollback could use it; its model is prepared when it is
+      // needed.
       set.index = 1;
       if (load(set)) previous_ = set;
       continue;
@@ -147,7 +148,7 @@ void Store::boot() {
   }
 }
 
-// --- checks -----------------------------------------------------------------------------------------------------
+// --- checks -------------------------------------------------------------------------------------------
 
 /// A model that the cycle neither uses nor may come to use.
 bool Store::free_model(std::uint32_t& index) const {
@@ -202,7 +203,7 @@ bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
   return true;
 }
 
-// --- staging ----------------------------------------------------------------------------------------------------
+// --- staging ------------------------------------------------------------------------------------------
 
 Answer Store::begin(std::uint32_t length, Origin origin) {
   if (state_ == StoreState::trial) return answer(Answer::wrong_state);
@@ -292,7 +293,7 @@ void Store::disconnect(Origin origin) {
   if ((state_ == StoreState::receiving || state_ == StoreState::verified) && owns(origin)) release();
 }
 
-// --- commands that write non-volatile memory -----------------------------------------------------------------------
+// --- commands that write non-volatile memory ----------------------------------------------------------
 
 Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
   if (state_ == StoreState::receiving) {
@@ -391,7 +392,7 @@ Answer Store::run(Command command, std::uint32_t argument, Origin origin) {
   return answer(Answer::unknown_command, static_cast<std::uint32_t>(command));
 }
 
-// --- background -------------------------------------------------------------------------------------------------
+// --- background ---------------------------------------------------------------------------------------
 
 void Store::make_active(const Set& set) {
   sets_.handover.activate(set.index);

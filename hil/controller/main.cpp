@@ -1,5 +1,5 @@
-// flexcomp-controller: the firmware library as a Linux process. A thread of its own runs the control cycle, as the
-// timer interrupt of a controller would; the main thread serves the buses and the parameter store.
+// flexcomp-controller: the firmware library as a Linux process. A thread of its own runs the control cycle,
+// as the timer interrupt of a controller would; the main thread serves the buses and the parameter store.
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <time.h>
@@ -129,8 +129,9 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
   return o;
 }
 
-/// The control cycle: the arm sways slowly about the middle of its range, so that directions turn and what the cycle
-/// publishes moves. Cycles that the machine was too busy for are left out, never made up for in a burst.
+/// The control cycle: the arm sways slowly about the middle of its range, so that directions turn and what
+/// the cycle publishes moves. Cycles that the machine was too busy for are left out, never made up for in a
+/// burst.
 void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atomic<bool>& stop) {
   const auto context = default_context<firmware::Scalar>(device.robot());
   timespec next{};

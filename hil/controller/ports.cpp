@@ -24,8 +24,8 @@ namespace {
 
 std::string reason() { return std::strerror(errno); }
 
-/// How long a serial line is silent before it counts as back in step. Longer than the standard's 1.75 ms because a
-/// process sees bytes in bursts; much shorter than any client waits for an answer.
+/// How long a serial line is silent before it counts as back in step. Longer than the standard's 1.75 ms
+/// because a process sees bytes in bursts; much shorter than any client waits for an answer.
 constexpr std::uint32_t rtu_gap_us = 50'000;
 
 constexpr std::size_t most_unsent_bytes = 65536;
@@ -44,7 +44,7 @@ std::uint32_t now_us() {
       duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
 }
 
-// --- CAN --------------------------------------------------------------------------------------------------------
+// --- CAN ----------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -114,7 +114,7 @@ bool CanPort::send(void* self, std::uint16_t id, const std::uint8_t* bytes, std:
 
 std::string CanPort::text() const { return host::BusAddress{address_}.text(); }
 
-// --- Modbus TCP -------------------------------------------------------------------------------------------------
+// --- Modbus TCP ---------------------------------------------------------------------------------------
 
 TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
                  const host::ModbusTcpAddress& address)
@@ -245,7 +245,7 @@ void TcpPort::serve() {
 
 std::string TcpPort::text() const { return host::BusAddress{address_}.text(); }
 
-// --- Modbus RTU -------------------------------------------------------------------------------------------------
+// --- Modbus RTU ---------------------------------------------------------------------------------------
 
 namespace {
 
@@ -305,8 +305,8 @@ void RtuPort::serve() {
       line_.receive(in.data(), static_cast<std::size_t>(n), now_us());
       continue;
     }
-    // With VMIN 0 a silent line reads 0 bytes; a pseudo-terminal whose other end is closed, or an adapter that was
-    // pulled, reads EIO.
+    // With VMIN 0 a silent line reads 0 bytes; a pseudo-terminal whose other end is closed, or an adapter
+    // that was pulled, reads EIO.
     if (n < 0 && errno != EAGAIN && errno != EINTR) {
       device_.close();
       server_.disconnect();

@@ -1,6 +1,7 @@
 /// \file
-/// The buses of the process: what stands between the firmware's servers and the sockets and devices of Linux. Each
-/// port is asked for the descriptors that it waits on and then serves what has come; none of them blocks.
+/// The buses of the process: what stands between the firmware's servers and the sockets and devices of
+/// Linux. Each port is asked for the descriptors that it waits on and then serves what has come; none of them
+/// blocks.
 #ifndef FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
 #define FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
 
@@ -82,7 +83,8 @@ class TcpPort final : public Port {
   std::uint64_t clock_ = 0;
 };
 
-/// Modbus RTU on a serial device. A device that goes away (an unplugged adapter) is opened again when it is back.
+/// Modbus RTU on a serial device. A device that goes away (an unplugged adapter) is opened again when it is
+/// back.
 class RtuPort final : public Port {
  public:
   /// \throws host::BusError  no such device, not a serial device, or a baud rate that it does not have

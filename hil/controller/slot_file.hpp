@@ -1,6 +1,6 @@
 /// \file
-/// Non-volatile memory as a file: two slots one after the other, erased bytes 0xFF, every write on the disk before it
-/// counts as done. Each byte is written once between two erases, as on flash.
+/// Non-volatile memory as a file: two slots one after the other, erased bytes 0xFF, every write on the
+/// disk before it counts as done. Each byte is written once between two erases, as on flash.
 #ifndef FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
 #define FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
 

@@ -1,4 +1,5 @@
-// What the firmware's tests share: an arm, images for it, and a flash memory whose power can be cut at any byte.
+// What the firmware's tests share: an arm, images for it, and a flash memory whose power can be cut at any
+// byte.
 #ifndef FLEXCOMP_TESTS_FIRMWARE_BENCH_HPP
 #define FLEXCOMP_TESTS_FIRMWARE_BENCH_HPP
 
@@ -82,8 +83,8 @@ inline void reseal(Bytes& image) {
 
 struct PowerCut {};
 
-/// NOR flash: programming only clears bits, erasing sets them. `power` bytes may still be programmed or erased; then the
-/// power goes (an exception stands for it) and everything but the memory is lost.
+/// NOR flash: programming only clears bits, erasing sets them. `power` bytes may still be programmed or
+/// erased; then the power goes (an exception stands for it) and everything but the memory is lost.
 class Flash {
  public:
   std::array<std::array<std::uint8_t, slot_bytes>, 2> slots{};

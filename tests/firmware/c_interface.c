@@ -8,7 +8,7 @@
 
 static unsigned failures;
 
-static void expect(int ok, const char *what, int line) {
+static void expect(int ok, const char* what, int line) {
   if (ok) return;
   ++failures;
   printf("line %d: %s\n", line, what);
@@ -17,23 +17,24 @@ static void expect(int ok, const char *what, int line) {
 
 static uint8_t slots[2][FLEXCOMP_SLOT_BYTES];
 
-static flexcomp_storage_result read_slot(void *user, unsigned slot, uint32_t offset, uint8_t *to, uint32_t size) {
+static flexcomp_storage_result read_slot(void* user, unsigned slot, uint32_t offset, uint8_t* to,
+                                         uint32_t size) {
   (void)user;
   memcpy(to, slots[slot] + offset, size);
   return FLEXCOMP_STORAGE_DONE;
 }
 
 /* Busy every other time, as flash is. */
-static flexcomp_storage_result erase_slot(void *user, unsigned slot) {
-  unsigned *calls = user;
+static flexcomp_storage_result erase_slot(void* user, unsigned slot) {
+  unsigned* calls = user;
   if (++*calls % 2 != 0) return FLEXCOMP_STORAGE_BUSY;
   memset(slots[slot], 0xFF, sizeof slots[slot]);
   return FLEXCOMP_STORAGE_DONE;
 }
 
-static flexcomp_storage_result write_slot(void *user, unsigned slot, uint32_t offset, const uint8_t *from,
+static flexcomp_storage_result write_slot(void* user, unsigned slot, uint32_t offset, const uint8_t* from,
                                           uint32_t size) {
-  unsigned *calls = user;
+  unsigned* calls = user;
   if (++*calls % 2 != 0) return FLEXCOMP_STORAGE_BUSY;
   memcpy(slots[slot] + offset, from, size);
   return FLEXCOMP_STORAGE_DONE;
@@ -42,7 +43,7 @@ static flexcomp_storage_result write_slot(void *user, unsigned slot, uint32_t of
 static uint8_t answer[512];
 static size_t answer_size;
 
-static void send_bytes(void *user, const uint8_t *bytes, size_t size) {
+static void send_bytes(void* user, const uint8_t* bytes, size_t size) {
   (void)user;
   memcpy(answer, bytes, size);
   answer_size = size;
@@ -51,7 +52,7 @@ static void send_bytes(void *user, const uint8_t *bytes, size_t size) {
 static uint16_t frames[16];
 static unsigned frame_count;
 
-static int send_frame(void *user, uint16_t id, const uint8_t *bytes, uint8_t size) {
+static int send_frame(void* user, uint16_t id, const uint8_t* bytes, uint8_t size) {
   (void)user;
   (void)bytes;
   (void)size;
@@ -59,7 +60,7 @@ static int send_frame(void *user, uint16_t id, const uint8_t *bytes, uint8_t siz
   return 1;
 }
 
-static uint32_t crc32_of(const uint8_t *bytes, size_t size) {
+static uint32_t crc32_of(const uint8_t* bytes, size_t size) {
   uint32_t crc = 0xFFFFFFFFu;
   size_t i;
   for (i = 0; i < size; ++i) {
@@ -70,13 +71,13 @@ static uint32_t crc32_of(const uint8_t *bytes, size_t size) {
   return ~crc;
 }
 
-static void put16(uint8_t *p, unsigned v) {
+static void put16(uint8_t* p, unsigned v) {
   p[0] = (uint8_t)(v >> 8);
   p[1] = (uint8_t)v;
 }
 
 /* One request over Modbus TCP; returns the function code of the answer. */
-static unsigned ask(flexcomp_tcp *tcp, const uint8_t *pdu, size_t size) {
+static unsigned ask(flexcomp_tcp* tcp, const uint8_t* pdu, size_t size) {
   uint8_t frame[300];
   memset(frame, 0, sizeof frame);
   put16(frame + 4, (unsigned)size + 1u);
@@ -87,7 +88,7 @@ static unsigned ask(flexcomp_tcp *tcp, const uint8_t *pdu, size_t size) {
   return answer_size < 8 ? 0 : answer[7];
 }
 
-static unsigned run(flexcomp_tcp *tcp, unsigned command, unsigned argument) {
+static unsigned run(flexcomp_tcp* tcp, unsigned command, unsigned argument) {
   uint8_t pdu[12] = {0x10, 0x00, 0xA0, 0, 3, 6, 0, 0, 0, 0, 0, 0};
   put16(pdu + 8, argument);
   put16(pdu + 10, command);
@@ -111,10 +112,10 @@ int main(void) {
   flexcomp_settings settings;
   flexcomp_context context;
   flexcomp_state state;
-  flexcomp_arm *fc;
-  flexcomp_tcp *tcp;
-  flexcomp_rtu *rtu;
-  flexcomp_can *can;
+  flexcomp_arm* fc;
+  flexcomp_tcp* tcp;
+  flexcomp_rtu* rtu;
+  flexcomp_can* can;
   flexcomp_real q[FLEXCOMP_JOINTS] = {0};
   flexcomp_real out[FLEXCOMP_JOINTS];
   uint8_t image[100];
@@ -214,7 +215,8 @@ int main(void) {
   EXPECT(state.active_sequence == 1 && state.active_bytes == sizeof image && state.faults == 0);
   EXPECT(strcmp(flexcomp_answer_text(state.answer), "accepted") == 0);
   EXPECT(flexcomp_step(fc, q, &context, out) != FLEXCOMP_NO_SET);
-  for (j = 0; j < 6; ++j) EXPECT(fabs((double)(out[j] - q[j])) < 1e-6); /* a set without terms corrects nothing */
+  for (j = 0; j < 6; ++j)
+    EXPECT(fabs((double)(out[j] - q[j])) < 1e-6); /* a set without terms corrects nothing */
 
   /* Half a transfer, and the connection goes. */
   EXPECT(run(tcp, 1, 200) == 0x10);

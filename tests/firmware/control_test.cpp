@@ -91,8 +91,9 @@ TEST(Step, EqualsTheCoreOnceFadedIn) {
   }
 }
 
-// However sets come and go (pushed, rolled back, on trial and reverted, restored, one in the middle of another's fade),
-// the correction moves by no more than the sets' own motion and the share of their difference that the fade allows.
+// However sets come and go (pushed, rolled back, on trial and reverted, restored, one in the middle of
+// another's fade), the correction moves by no more than the sets' own motion and the share of their
+// difference that the fade allows.
 TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
   constexpr std::uint32_t fade = 50;
   DeviceSettings settings;

@@ -394,8 +394,9 @@ TEST(Store, StartsWithTheOlderSetWhereTheNewestIsDamaged) {
   EXPECT_EQ(none.device->status().faults, wire::fault::no_valid_set);
 }
 
-// The power goes at every single byte that a commit, a confirmed trial, a rollback or a restore erases or programs. After
-// the start there is the set from before or the one from after, whole; after an acknowledgement only the one from after.
+// The power goes at every single byte that a commit, a confirmed trial, a rollback or a restore erases or
+// programs. After the start there is the set from before or the one from after, whole; after an
+// acknowledgement only the one from after.
 TEST(Store, SurvivesAPowerCutAtEveryByte) {
   const Robot robot = tx60l();
   const Bytes one = make_image(robot, 1);

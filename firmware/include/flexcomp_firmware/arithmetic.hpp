@@ -1,5 +1,6 @@
 /// \file
-/// The core's evaluations, compiled once: inlined into each of their callers they would lie in flash three times.
+/// The core's evaluations, compiled once: inlined into each of their callers they would lie in flash
+/// three times.
 #ifndef FLEXCOMP_FIRMWARE_ARITHMETIC_HPP
 #define FLEXCOMP_FIRMWARE_ARITHMETIC_HPP
 

@@ -1,6 +1,7 @@
 /// \file
-/// CANopen node to CiA 301: NMT slave, boot-up, heartbeat producer and one SDO server (expedited and segmented) with
-/// the object dictionary of canopen_objects.hpp. Frames come and go through callbacks; no I/O in here.
+/// CANopen node to CiA 301: NMT slave, boot-up, heartbeat producer and one SDO server (expedited and
+/// segmented) with the object dictionary of canopen_objects.hpp. Frames come and go through callbacks; no I/O
+/// in here.
 #ifndef FLEXCOMP_FIRMWARE_CANOPEN_HPP
 #define FLEXCOMP_FIRMWARE_CANOPEN_HPP
 
@@ -14,8 +15,8 @@
 namespace flexcomp {
 namespace firmware {
 
-/// Sends one data frame with an 11-bit identifier. False where there is no room now: it is offered again at the next
-/// poll(), and a newer answer takes its place.
+/// Sends one data frame with an 11-bit identifier. False where there is no room now: it is offered again at
+/// the next poll(), and a newer answer takes its place.
 struct CanTransmit {
   void* user = nullptr;
   bool (*send)(void* user, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) = nullptr;
@@ -33,7 +34,8 @@ class CanopenNode {
   CanopenNode(const CanopenNode&) = delete;
   CanopenNode& operator=(const CanopenNode&) = delete;
 
-  /// A data frame with an 11-bit identifier (no remote frame) as it came from the bus. Any bytes are survived.
+  /// A data frame with an 11-bit identifier (no remote frame) as it came from the bus. Any bytes are
+  /// survived.
   void receive(std::uint16_t id, const std::uint8_t* bytes, std::size_t size);
 
   /// Boot-up message, heartbeat, timeouts and frames that found no room. now_ms wraps.

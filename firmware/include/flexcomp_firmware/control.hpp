@@ -21,8 +21,8 @@ struct ParameterSets {
   Handover handover{};
 };
 
-/// What the step does with a command that it refuses (not finite, beyond a joint limit, or with a context that is
-/// not finite).
+/// What the step does with a command that it refuses (not finite, beyond a joint limit, or with a context
+/// that is not finite).
 enum class OnRefusal : std::uint8_t {
   pass_through = 0,          ///< the correction fades out to zero
   hold_last_correction = 1,  ///< the last correction is kept on top of the command
@@ -32,8 +32,8 @@ struct ControlSettings {
   CompensationSettings<Scalar> compensation{};
   /// Cycles over which the correction moves from the old set's to the new one's; 0: at once.
   std::uint32_t fade_cycles = 1000;
-  /// Motion against the last direction after which a joint's direction counts as reversed, rad. Within the band the
-  /// direction moves linearly from -1 to +1, so that a reversal never makes the command step.
+  /// Motion against the last direction after which a joint's direction counts as reversed, rad. Within the
+  /// band the direction moves linearly from -1 to +1, so that a reversal never makes the command step.
   Scalar direction_band_rad = Scalar(1e-4);
   OnRefusal on_refusal = OnRefusal::pass_through;
 };
@@ -52,23 +52,24 @@ struct ControlPublication {
   std::atomic<std::uint32_t> largest_correction_rad{0};  ///< binary32 bits, of any joint since the start
 };
 
-/// State and step of the control cycle. One thread or interrupt calls step(); nothing here is shared but the handover
-/// and the publication.
+/// State and step of the control cycle. One thread or interrupt calls step(); nothing here is shared but the
+/// handover and the publication.
 class ControlCycle {
  public:
-  /// Limits of the joints are the robot's. Settings that are not sensible (a negative or non-finite band or largest
-  /// correction) are replaced by 0: no correction rather than a wild one.
+  /// Limits of the joints are the robot's. Settings that are not sensible (a negative or non-finite band or
+  /// largest correction) are replaced by 0: no correction rather than a wild one.
   ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings);
 
   /// One control cycle. `context.direction` is not read: the step tracks the directions from the commands.
   ///
-  /// A set is taken at the start and used to the end. When the set changes, the difference between the correction of
-  /// the cycle before and the new set's is kept and decays to zero over fade_cycles, as v^2 (3 - 2 v) with v from 1
-  /// to 0. So a change of set moves the command by at most 1.5 / fade_cycles of that difference per cycle, and no
-  /// cycle evaluates two sets. The same holds where the status changes between corrected and passed through.
+  /// A set is taken at the start and used to the end. When the set changes, the difference between the
+  /// correction of the cycle before and the new set's is kept and decays to zero over fade_cycles, as v^2 (3
+  /// - 2 v) with v from 1 to 0. So a change of set moves the command by at most 1.5 / fade_cycles of that
+  /// difference per cycle, and no cycle evaluates two sets. The same holds where the status changes between
+  /// corrected and passed through.
   ///
-  /// A command that is not finite is returned as it came (or with the last correction on its finite joints), and
-  /// leaves directions, correction and fade as they were. Bounded work on any input.
+  /// A command that is not finite is returned as it came (or with the last correction on its finite joints),
+  /// and leaves directions, correction and fade as they were. Bounded work on any input.
   StepResult step(const Joints& q_command_rad, const FirmwareContext& context);
 
   const ControlPublication& publication() const { return publication_; }

@@ -1,6 +1,6 @@
 /// \file
-/// The controller's side of the wire without a bus: parameter store, control cycle and probe behind the records of
-/// flexcomp/wire/store_state.hpp. The bus servers talk to this.
+/// The controller's side of the wire without a bus: parameter store, control cycle and probe behind the
+/// records of flexcomp/wire/store_state.hpp. The bus servers talk to this.
 #ifndef FLEXCOMP_FIRMWARE_DEVICE_HPP
 #define FLEXCOMP_FIRMWARE_DEVICE_HPP
 
@@ -20,11 +20,13 @@ struct DeviceSettings {
   ControlSettings control{};
   StoreSettings store{};
   std::uint32_t cycle_us = 1000;  ///< period of the control cycle, told to clients
-  /// The robot's name (UTF-8), told to clients; copied. The set's binding is by its hash in the robot. May be null.
+  /// The robot's name (UTF-8), told to clients; copied. The set's binding is by its hash in the robot. May be
+  /// null.
   const char* name = nullptr;
 };
 
-/// One arm. step() belongs to the control cycle's thread or interrupt, everything else to the background's one.
+/// One arm. step() belongs to the control cycle's thread or interrupt, everything else to the background's
+/// one.
 class Device {
  public:
   Device(const Robot& robot, const Storage& storage, const DeviceSettings& settings);

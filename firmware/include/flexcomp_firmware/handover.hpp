@@ -1,8 +1,8 @@
 /// \file
-/// How a parameter set changes hands between the background, which takes sets in, and the control cycle, which uses
-/// one: a request word that only the background writes and an acknowledgement that only the cycle writes. The cycle
-/// reads the request once, never waits and never retries; the background may touch a model only when the cycle has
-/// acknowledged that it uses another one.
+/// How a parameter set changes hands between the background, which takes sets in, and the control
+/// cycle, which uses one: a request word that only the background writes and an acknowledgement that only the
+/// cycle writes. The cycle reads the request once, never waits and never retries; the background may touch a
+/// model only when the cycle has acknowledged that it uses another one.
 ///
 /// The countdown of a trial runs in the cycle: a set on trial reverts also when the background hangs.
 #ifndef FLEXCOMP_FIRMWARE_HANDOVER_HPP
@@ -18,19 +18,20 @@ class Handover {
  public:
   static constexpr std::uint32_t none = 2;  ///< no set: commands are passed through
 
-  // --- background -------------------------------------------------------------------------------------------
+  // --- background -------------------------------------------------------------------------------------
 
   /// Asks the cycle to use model `index` (0, 1 or none) from its next start on.
   void activate(std::uint32_t index) { post(index, 0); }
 
-  /// The same, but back to `fallback` after `cycles` control cycles (at least 1) unless confirm() comes before.
+  /// The same, but back to `fallback` after `cycles` control cycles (at least 1) unless confirm() comes
+  /// before.
   void activate_on_trial(std::uint32_t index, std::uint32_t fallback, std::uint32_t cycles) {
     trial_cycles_.store(cycles, std::memory_order_relaxed);
     post(index, trial_bit | (fallback << fallback_shift));
   }
 
-  /// Ends the trial in favour of the set on trial. Only when settled(); afterwards wait for settled() and look at
-  /// reverted(): the trial may have run out just before.
+  /// Ends the trial in favour of the set on trial. Only when settled(); afterwards wait for settled() and
+  /// look at reverted(): the trial may have run out just before.
   void confirm() { post(requested(), confirm_bit); }
 
   /// True when the cycle has seen the last request.
@@ -50,7 +51,7 @@ class Handover {
   /// Control cycles until the trial runs out; 0 where there is none.
   std::uint32_t trial_cycles_left() const { return left_.load(std::memory_order_relaxed); }
 
-  // --- control cycle ----------------------------------------------------------------------------------------
+  // --- control cycle ----------------------------------------------------------------------------------
 
   /// The model to use in this cycle (0, 1 or none); `changed` tells whether that is news.
   std::uint32_t take(bool& changed) {

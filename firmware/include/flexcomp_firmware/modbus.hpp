@@ -1,6 +1,7 @@
 /// \file
-/// Modbus server: the PDU layer as a function from request to response (Modbus Application Protocol V1.1b3) and the
-/// two framings as byte-stream machines (Modbus over Serial Line V1.02, Messaging on TCP/IP V1.0b). No I/O in here.
+/// Modbus server: the PDU layer as a function from request to response (Modbus Application Protocol
+/// V1.1b3) and the two framings as byte-stream machines (Modbus over Serial Line V1.02, Messaging on TCP/IP
+/// V1.0b). No I/O in here.
 #ifndef FLEXCOMP_FIRMWARE_MODBUS_HPP
 #define FLEXCOMP_FIRMWARE_MODBUS_HPP
 
@@ -20,9 +21,10 @@ class ModbusServer {
   /// `origin` must differ between the objects that share a device, and from `nobody`.
   ModbusServer(Device& device, Origin origin) : device_(device), origin_(origin) {}
 
-  /// Answers one request PDU (function code and data) into `out`, which holds modbus::pdu_bytes. Returns the bytes of
-  /// the answer; 0 only for an empty request. Any bytes are answered, by an exception where need be (V1.1b3, clause
-  /// 7), and checked in the order quantity (03), addresses (02), byte count (03), then the application (04, 06).
+  /// Answers one request PDU (function code and data) into `out`, which holds modbus::pdu_bytes. Returns the
+  /// bytes of the answer; 0 only for an empty request. Any bytes are answered, by an exception where need be
+  /// (V1.1b3, clause 7), and checked in the order quantity (03), addresses (02), byte count (03), then the
+  /// application (04, 06).
   std::size_t answer(const std::uint8_t* request, std::size_t size, std::uint8_t* out);
 
   /// The client is gone: what it has staged is dropped, offsets and probe are as at the start.
@@ -45,8 +47,8 @@ class ModbusServer {
   std::array<std::uint8_t, wire::probe_response_bytes> probe_response_{};
 };
 
-/// CRC-16 of Modbus (V1.02, 6.2.2): x^16 + x^15 + x^2 + 1 reflected, init 0xFFFF ("123456789" -> 0x4B37). Continues
-/// `crc` over more bytes; over a frame with its CRC it ends at 0.
+/// CRC-16 of Modbus (V1.02, 6.2.2): x^16 + x^15 + x^2 + 1 reflected, init 0xFFFF ("123456789" -> 0x4B37).
+/// Continues `crc` over more bytes; over a frame with its CRC it ends at 0.
 std::uint16_t modbus_crc(const std::uint8_t* bytes, std::size_t size, std::uint16_t crc = 0xFFFF);
 
 /// Where a server puts what it sends: called from within receive() or poll(), at most once per request.
@@ -55,12 +57,12 @@ struct Transmit {
   void (*send)(void* user, const std::uint8_t* bytes, std::size_t size) = nullptr;
 };
 
-/// RTU framing on a serial line. A frame ends where its function code says, or, with an unknown function code, at the
-/// gap; whatever is left at a gap is dropped. Frames of other units are followed by their CRC.
+/// RTU framing on a serial line. A frame ends where its function code says, or, with an unknown function
+/// code, at the gap; whatever is left at a gap is dropped. Frames of other units are followed by their CRC.
 ///
-/// The standard ends a frame at 3.5 characters without a byte (1.75 ms above 19200 baud). Where bytes reach us in
-/// bursts (USB adapters, emulators) that tears frames, hence the length; the gap here only resynchronises and may be
-/// several times longer.
+/// The standard ends a frame at 3.5 characters without a byte (1.75 ms above 19200 baud). Where bytes reach
+/// us in bursts (USB adapters, emulators) that tears frames, hence the length; the gap here only
+/// resynchronises and may be several times longer.
 class ModbusRtu {
  public:
   /// `unit` 1 … 247.
@@ -95,8 +97,8 @@ class ModbusTcp {
   ModbusTcp(ModbusServer& server, std::uint8_t unit, const Transmit& transmit)
       : server_(&server), unit_(unit), transmit_(transmit) {}
 
-  /// Bytes from the stream, in any portions. False where the stream is not Modbus (protocol identifier not 0, or a
-  /// length that no PDU has): the connection must be closed, there is no way to find the next frame.
+  /// Bytes from the stream, in any portions. False where the stream is not Modbus (protocol identifier not 0,
+  /// or a length that no PDU has): the connection must be closed, there is no way to find the next frame.
   bool receive(const std::uint8_t* bytes, std::size_t size);
 
  private:

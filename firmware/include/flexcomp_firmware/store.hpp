@@ -1,8 +1,9 @@
 /// \file
-/// The parameter store: takes in a parameter image, checks it, writes it to non-volatile memory, makes it active,
-/// and brings it back after a power loss. One machine behind every bus.
+/// The parameter store: takes in a parameter image, checks it, writes it to non-volatile memory, makes
+/// it active, and brings it back after a power loss. One machine behind every bus.
 ///
-/// Non-volatile memory has two slots. A slot holds the image from its first byte and, in its last 32 bytes, a seal:
+/// Non-volatile memory has two slots. A slot holds the image from its first byte and, in its last 32 bytes, a
+/// seal:
 ///
 ///      0  "FLXS"
 ///      4  u32 bytes of the image
@@ -11,12 +12,12 @@
 ///     16  12 bytes 0
 ///     28  u32 CRC-32 of the 28 bytes before
 ///
-/// The seal is written last, when the image has been read back, so a slot counts only if everything in it is in
-/// order; the power may go at any byte. A set on trial has no seal until it is confirmed. The active slot is never
-/// written; rollback erases it, because then the other one is all there is at the next start.
+/// The seal is written last, when the image has been read back, so a slot counts only if everything in it is
+/// in order; the power may go at any byte. A set on trial has no seal until it is confirmed. The active slot
+/// is never written; rollback erases it, because then the other one is all there is at the next start.
 ///
-/// Everything here runs in the background, in one thread; only the handover word and the models that the cycle does
-/// not use are shared with the control cycle.
+/// Everything here runs in the background, in one thread; only the handover word and the models that the
+/// cycle does not use are shared with the control cycle.
 #ifndef FLEXCOMP_FIRMWARE_STORE_HPP
 #define FLEXCOMP_FIRMWARE_STORE_HPP
 
@@ -40,8 +41,8 @@ enum class StorageResult : std::int8_t {
       1,  ///< erase and write only: nothing has been done yet, or it is under way; the same call comes again
 };
 
-/// Non-volatile memory as the store needs it: two slots (0 and 1) of slot_bytes each. The hooks are called from the
-/// background only. Where a hook is null the store keeps nothing and refuses to commit.
+/// Non-volatile memory as the store needs it: two slots (0 and 1) of slot_bytes each. The hooks are called
+/// from the background only. Where a hook is null the store keeps nothing and refuses to commit.
 struct Storage {
   void* user = nullptr;
   /// Reads `size` bytes from `offset` of a slot; an unwritten slot may read as anything.
@@ -49,8 +50,8 @@ struct Storage {
                         std::uint32_t size) = nullptr;
   /// Makes a whole slot writable. When power goes meanwhile, any of its bytes may be old or erased.
   StorageResult (*erase)(void* user, unsigned slot) = nullptr;
-  /// Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot; each byte is
-  /// written once between two erases. Done means that the bytes survive a power loss.
+  /// Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot;
+  /// each byte is written once between two erases. Done means that the bytes survive a power loss.
   StorageResult (*write)(void* user, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
                          std::uint32_t size) = nullptr;
 };
@@ -75,8 +76,8 @@ class Store {
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
 
-  /// Before the control cycle starts: the highest valid sequence becomes active, else the other slot with the fault
-  /// `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again.
+  /// Before the control cycle starts: the highest valid sequence becomes active, else the other slot with the
+  /// fault `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again.
   void boot();
 
   /// One command of the wire. What it ended with is in status() as well.
@@ -94,7 +95,8 @@ class Store {
   /// The connection is gone: drops what it has staged. A commit under way is not touched.
   void disconnect(Origin origin);
 
-  /// Reads the active image as it lies in its slot. False beyond its end, without a set, or where reading fails.
+  /// Reads the active image as it lies in its slot. False beyond its end, without a set, or where reading
+  /// fails.
   bool read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size);
 
   /// Goes on with what is under way; at most one storage call of 256 bytes each time. now_ms wraps.
