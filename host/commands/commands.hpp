@@ -18,6 +18,7 @@ void add_pull(CLI::App& app);
 void add_status(CLI::App& app);
 void add_rollback(CLI::App& app);
 void add_probe(CLI::App& app);
+void add_report(CLI::App& app);
 
 }  // namespace flexcomp::host
 

@@ -1,1 +1,310 @@
 #include "report/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "report/escape.hpp"
+#include "report/plots.hpp"
+#include "report/style.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+double length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
+
+struct Numbers {
+  double mean = 0, rms = 0, median = 0, max = 0;
+};
+
+Numbers numbers_of(std::vector<double> values) {
+  Numbers n;
+  if (values.empty()) return n;
+  std::sort(values.begin(), values.end());
+  double squares = 0;
+  for (const double v : values) {
+    n.mean += v;
+    squares += v * v;
+  }
+  const auto count = static_cast<double>(values.size());
+  n.mean /= count;
+  n.rms = std::sqrt(squares / count);
+  n.median = 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+  n.max = values.back();
+  return n;
+}
+
+/// Three significant digits and no more than five decimals.
+std::string shown(double v) {
+  if (v == 0) return "0";
+  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(std::abs(v)))), 0, 5);
+  return fmt::format("{:.{}f}", v, decimals);
+}
+
+ErrorPairs positions(const PagePoses& set) {
+  ErrorPairs e;
+  e.unit = "mm";
+  if (set.noise_floor_m) e.floor = *set.noise_floor_m * 1e3;
+  for (const PagePose& p : set.poses) {
+    e.before.push_back(length(p.before_m) * 1e3);
+    e.after.push_back(length(p.after_m) * 1e3);
+  }
+  return e;
+}
+
+/// Empty where an orientation is not known at every pose.
+ErrorPairs orientations(const PagePoses& set) {
+  ErrorPairs e;
+  e.unit = "deg";
+  for (const PagePose& p : set.poses) {
+    if (!p.before_rad || !p.after_rad) return {};
+    e.before.push_back(degrees(*p.before_rad));
+    e.after.push_back(degrees(*p.after_rad));
+  }
+  return e;
+}
+
+std::string figure(const std::string& svg, const std::string& caption) {
+  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", svg, caption);
+}
+
+std::string summary_row(const char* name, double before, double after) {
+  const std::string change = after > 0 && before > 0 ? fmt::format("{:.1f} ×", before / after) : "–";
+  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n", name,
+                     shown(before), shown(after), change);
+}
+
+std::string summary_table(const PagePoses& set, const ErrorPairs& position, const ErrorPairs& orientation) {
+  const Numbers pb = numbers_of(position.before), pa = numbers_of(position.after);
+  std::string out = fmt::format(
+      "<table class=\"summary\"><thead><tr><th scope=\"col\">error</th><th scope=\"col\">before</th>"
+      "<th scope=\"col\">after</th><th scope=\"col\">smaller by</th></tr></thead><tbody>\n");
+  out += summary_row("mean [mm]", pb.mean, pa.mean);
+  out += summary_row("median [mm]", pb.median, pa.median);
+  out += summary_row("rms [mm]", pb.rms, pa.rms);
+  out += summary_row("largest [mm]", pb.max, pa.max);
+  if (!orientation.before.empty()) {
+    const Numbers ob = numbers_of(orientation.before), oa = numbers_of(orientation.after);
+    out += summary_row("mean [deg]", ob.mean, oa.mean);
+    out += summary_row("largest [deg]", ob.max, oa.max);
+  }
+  out += "</tbody></table>\n";
+  out += fmt::format(
+      "<p class=\"key\"><span class=\"mark before\"></span> before: {} &nbsp; <span class=\"mark "
+      "after\"></span> after: {}</p>\n",
+      escaped(set.before), escaped(set.after));
+  return out;
+}
+
+std::string poses_section(const PagePoses& set) {
+  std::string out = fmt::format("<section><h2>{}</h2>\n", escaped(set.title));
+  if (!set.about.empty()) out += fmt::format("<p>{}</p>\n", escaped(set.about));
+  if (set.poses.empty()) return out + "<p>No poses.</p></section>\n";
+  const ErrorPairs position = positions(set);
+  const ErrorPairs orientation = orientations(set);
+  out += fmt::format(
+      "<p class=\"headline\"><span class=\"before\">{} mm</span> → <span class=\"after\">{} mm</span> "
+      "<small>mean position error over {} poses</small></p>\n",
+      shown(numbers_of(position.before).mean), shown(numbers_of(position.after).mean), set.poses.size());
+  out += summary_table(set, position, orientation);
+  const auto outliers =
+      std::count_if(set.poses.begin(), set.poses.end(), [](const PagePose& p) { return p.outlier; });
+  if (outliers > 0) {
+    std::string which;
+    std::size_t named = 0;
+    for (std::size_t k = 0; k < set.poses.size() && named < 12; ++k) {
+      if (set.poses[k].outlier) which += fmt::format("{}{}", named++ > 0 ? ", " : "", k + 1);
+    }
+    out +=
+        fmt::format("<p>{} of {} poses lie far from the rest and do not count in full: {}{}.</p>\n", outliers,
+                    set.poses.size(), which, static_cast<std::size_t>(outliers) > named ? ", …" : "");
+  }
+  out += "<div class=\"plots\">\n";
+  out += figure(plot_in_order(position), "Position error of each pose, in the order of the data.");
+  out += figure(plot_sorted(position),
+                "The same, sorted: the share of the poses whose error lies below a value.");
+  out += figure(plot_histogram(position), "How many poses have which position error.");
+  if (!orientation.before.empty()) {
+    out += figure(plot_sorted(orientation), "Orientation error, sorted.");
+  }
+  out +=
+      "</div>\n<h3>What is left, against each joint</h3>\n"
+      "<p>The three components of the position error after: "
+      "<span class=\"mark x\"></span> x, <span class=\"mark y\"></span> y, <span class=\"mark z\"></span> z. "
+      "Noise has no "
+      "shape here; a curve or a slope is an effect that the model does not have.</p>\n<div "
+      "class=\"plots\">\n";
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    out += figure(plot_against_joint(set.poses, j), fmt::format("Joint {}.", j + 1));
+  }
+  return out + "</div></section>\n";
+}
+
+/// The unit that a parameter's name ends with, for people.
+std::string unit_of_name(std::string_view name) {
+  static constexpr std::array<std::pair<std::string_view, const char*>, 10> units{
+      {{"rad_per_nm3", "rad/(N·m)³"},
+       {"rad_per_nm", "rad/(N·m)"},
+       {"mm_per_h", "mm/h"},
+       {"deg_per_h", "deg/h"},
+       {"per_k", "1/K"},
+       {"_kg", "kg"},
+       {"_mm", "mm"},
+       {"_deg", "deg"},
+       {"rad", "rad"},
+       {"gain", ""}}};
+  for (const auto& [suffix, text] : units) {
+    if (name.ends_with(suffix)) return text;
+  }
+  return "";
+}
+
+/// A value to the second digit of its uncertainty; small numbers with a power of ten.
+std::pair<std::string, std::string> with_uncertainty(double value, const std::optional<double>& sigma) {
+  const double size = std::max(std::abs(value), sigma.value_or(0));
+  if (size == 0) return {"0", sigma ? "0" : "–"};
+  const bool small = size < 1e-3;
+  const int exponent = small ? static_cast<int>(std::floor(std::log10(size))) : 0;
+  const double unit = std::pow(10, exponent);
+  const double least = sigma && *sigma > 0 ? *sigma / unit : std::abs(value) / unit * 1e-3;
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(least))), 0, 7);
+  const auto text = [&](double v) {
+    std::string t = fmt::format("{:.{}f}", v / unit, decimals);
+    if (small) t += fmt::format("e{}", exponent);
+    return t;
+  };
+  return {text(value), sigma ? text(*sigma) : "–"};
+}
+
+std::string parameter_table(const Page& page) {
+  if (page.parameters.empty()) return "";
+  std::string out =
+      "<section><h2>Parameters</h2>\n<p>Estimates with one standard deviation. Pale: not larger than twice "
+      "its own "
+      "uncertainty, so it may as well be zero.</p>\n<div class=\"scroll\"><table "
+      "class=\"parameters\"><thead><tr>"
+      "<th scope=\"col\">parameter</th><th scope=\"col\">value</th><th scope=\"col\">±</th><th "
+      "scope=\"col\">unit</th>"
+      "<th scope=\"col\">value / ±</th></tr></thead><tbody>\n";
+  for (const PageParameter& p : page.parameters) {
+    const auto [value, sigma] = with_uncertainty(p.value, p.sigma);
+    std::string ratio = "–";
+    bool pale = false;
+    if (p.sigma && *p.sigma > 0) {
+      const double times = std::abs(p.value) / *p.sigma;
+      pale = times < 2;
+      ratio = times < 100 ? fmt::format("{:.1f}", times) : fmt::format("{:.0f}", times);
+    }
+    out += fmt::format("<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                       pale ? " class=\"pale\"" : "", escaped(p.name), value, sigma, unit_of_name(p.name),
+                       ratio);
+  }
+  return out + "</tbody></table></div></section>\n";
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) {
+    out += fmt::format("{}<code>{}</code>", out.empty() ? "" : ", ", escaped(name));
+  }
+  return out;
+}
+
+std::string limits_of_the_data(const Page& page) {
+  std::string out;
+  if (!page.confounded.empty()) {
+    out +=
+        "<section><h2>Cannot be told apart</h2>\n<p>No data of this kind can separate these; the ones on the "
+        "left were "
+        "left out and the ones on the right carry them.</p>\n<ul>\n";
+    for (const PageConfounded& c : page.confounded) {
+      out += c.with.empty() ? fmt::format("<li><code>{}</code>: has no effect in these data</li>\n",
+                                          escaped(c.parameter))
+                            : fmt::format("<li><code>{}</code>: carried by {}</li>\n", escaped(c.parameter),
+                                          joined(c.with));
+    }
+    out += "</ul></section>\n";
+  }
+  if (!page.missing.empty()) {
+    out += fmt::format(
+        "<section><h2>Missing in these data</h2>\n<p>Other poses of the same kind would know them: {}.</p>\n",
+        joined(page.missing));
+    if (!page.cure_rad.empty()) {
+      out += "<p>Poses that would cure it, best first [deg]:</p><div class=\"scroll\"><table><thead><tr>";
+      for (std::size_t j = 0; j < joint_count; ++j) out += fmt::format("<th scope=\"col\">q{}</th>", j + 1);
+      out += "</tr></thead><tbody>\n";
+      for (const auto& q : page.cure_rad) {
+        out += "<tr>";
+        for (const double v : q) out += fmt::format("<td>{:.1f}</td>", degrees(v));
+        out += "</tr>\n";
+      }
+      out += "</tbody></table></div>\n";
+    }
+    out += "</section>\n";
+  }
+  return out;
+}
+
+std::string results_table(const Page& page) {
+  if (page.results.empty()) return "";
+  std::string out =
+      "<section><h2>Other data</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">data</th>"
+      "<th scope=\"col\">poses</th><th scope=\"col\">before, mean [mm]</th><th scope=\"col\">after, mean "
+      "[mm]</th></tr></thead><tbody>\n";
+  std::string remarks;
+  for (const PageResult& r : page.results) {
+    out += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                       escaped(r.title), r.poses, shown(r.before_m * 1e3), shown(r.after_m * 1e3));
+    if (!r.remark.empty()) remarks += fmt::format("<p>{}: {}</p>\n", escaped(r.title), escaped(r.remark));
+  }
+  return out + "</tbody></table></div>\n" + remarks + "</section>\n";
+}
+
+/// Only places beside this page or inside it: a report never leads into the network.
+bool is_local(const std::string& href) {
+  return !href.empty() && href.find(':') == std::string::npos && !href.starts_with("//");
+}
+
+}  // namespace
+
+std::string html(const Page& page) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, "
+      "initial-scale=1\">\n<title>{0}</title>\n<style>\n{1}</style>\n"
+      "</head>\n<body>\n<main>\n<header><h1>{0}</h1>\n",
+      escaped(page.title), page_style);
+  if (!page.summary.empty()) out += fmt::format("<p class=\"lead\">{}</p>\n", escaped(page.summary));
+  out += "</header>\n";
+  if (!page.doubts.empty()) {
+    out += "<section class=\"doubts\"><h2>Do not rely on this yet</h2>\n<ul>\n";
+    for (const std::string& doubt : page.doubts) out += fmt::format("<li>{}</li>\n", escaped(doubt));
+    out += "</ul></section>\n";
+  }
+  if (!page.facts.empty()) {
+    out += "<dl class=\"facts\">\n";
+    for (const PageFact& f : page.facts) {
+      out += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", escaped(f.name), escaped(f.value));
+    }
+    out += "</dl>\n";
+  }
+  for (const PagePoses& set : page.poses) out += poses_section(set);
+  out += results_table(page);
+  out += limits_of_the_data(page);
+  out += parameter_table(page);
+  std::string links;
+  for (const PageLink& link : page.links) {
+    if (is_local(link.href)) {
+      links += fmt::format("<li><a href=\"{}\">{}</a></li>\n", escaped(link.href), escaped(link.text));
+    }
+  }
+  if (!links.empty()) out += fmt::format("<nav><h2>Beside this page</h2><ul>\n{}</ul></nav>\n", links);
+  if (!page.made_by.empty()) out += fmt::format("<footer>{}</footer>\n", escaped(page.made_by));
+  return out + "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace flexcomp::host

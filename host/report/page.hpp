@@ -50,6 +50,15 @@ struct PageFact {
   std::string value;
 };
 
+/// Another set of data with its own calibration, in a line.
+struct PageResult {
+  std::string title;  ///< "UR5, laser tracker"
+  std::size_t poses = 0;
+  double before_m = 0;  ///< mean position error
+  double after_m = 0;
+  std::string remark;
+};
+
 /// A link to a page beside this one, or to one of its own sections.
 struct PageLink {
   std::string href;
@@ -66,6 +75,7 @@ struct Page {
   std::vector<PageConfounded> confounded;
   std::vector<std::string> missing;  ///< parameters that these data do not know though such data could
   std::vector<std::array<double, joint_count>> cure_rad;  ///< poses that would make them known
+  std::vector<PageResult> results;
   std::vector<PageLink> links;
   std::string made_by;  ///< "flexcomp 0.1.0, 2025-01-31"
 };

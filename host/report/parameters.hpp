@@ -1,0 +1,17 @@
+/// \file
+/// What a calibration file says, for a page.
+#ifndef FLEXCOMP_HOST_REPORT_PARAMETERS_HPP
+#define FLEXCOMP_HOST_REPORT_PARAMETERS_HPP
+
+#include "files/calibration_file.hpp"
+#include "files/robot_file.hpp"
+#include "report/page.hpp"
+
+namespace flexcomp::host {
+
+/// Appends the parameters with their uncertainty, and what could not be told apart.
+void add_parameters(Page& page, const Calibration& calibration, const RobotFile& robot);
+
+}  // namespace flexcomp::host
+
+#endif

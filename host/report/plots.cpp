@@ -1,0 +1,294 @@
+#include "report/plots.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "report/escape.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+// In units of the drawing: about a pixel on a phone.
+constexpr double width = 360, height = 220;
+constexpr double left = 46, right = 12, top = 12, bottom = 36;
+// A logarithmic axis where one number is this many times another: else the smaller ones lie on the axis.
+constexpr double log_from_ratio = 8;
+
+struct Tick {
+  double value;
+  std::string text;
+};
+
+/// From values to a place between 0 and 1.
+struct Scale {
+  double low = 0, high = 1;
+  bool log = false;
+
+  double at(double v) const {
+    if (!log) return (v - low) / (high - low);
+    return std::log(std::max(v, low) / low) / std::log(high / low);
+  }
+  double value(double share) const {
+    return log ? low * std::pow(high / low, share) : low + share * (high - low);
+  }
+  std::vector<Tick> ticks(int about) const;
+};
+
+/// 1, 2 or 5 times a power of ten, so that there are about so many steps.
+double round_step(double range, int about) {
+  const double raw = range / about;
+  const double power = std::pow(10, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= raw * (1 - 1e-9)) return factor * power;
+  }
+  return 10 * power;
+}
+
+std::vector<Tick> Scale::ticks(int about) const {
+  std::vector<Tick> found;
+  if (log) {
+    const bool few = high / low < 300;  // 2 and 5 are named where there is room
+    for (int e = static_cast<int>(std::floor(std::log10(low))); std::pow(10, e) <= high * 1.001; ++e) {
+      for (const int factor : {1, 2, 5}) {
+        const double v = factor * std::pow(10, e);
+        if (v < low * 0.999 || v > high * 1.001 || (factor != 1 && !few)) continue;
+        found.push_back({v, fmt::format("{:g}", v)});
+      }
+    }
+    return found;
+  }
+  const double step = round_step(high - low, about);
+  for (double k = std::ceil(low / step - 1e-6); k * step <= high + 1e-6 * step; ++k) {
+    const double v = k * step;
+    found.push_back({v, fmt::format("{:g}", std::abs(v) < 1e-9 * step ? 0.0 : v)});
+  }
+  return found;
+}
+
+/// Covers positive numbers with round ends.
+Scale scale_of(const ErrorPairs& errors) {
+  double low = HUGE_VAL, high = 0, sum = 0;
+  for (const auto* set : {&errors.before, &errors.after}) {
+    for (const double v : *set) {
+      high = std::max(high, v);
+      if (v > 0) low = std::min(low, v);
+    }
+  }
+  if (errors.floor) {
+    high = std::max(high, *errors.floor);
+    low = std::min(low, *errors.floor);
+  }
+  for (const double v : errors.after) sum += v;
+  const double usual = errors.after.empty() ? high : sum / static_cast<double>(errors.after.size());
+  if (!(high > 0)) return {0, 1, false};
+  if (usual > 0 && high / usual > log_from_ratio) {
+    // One lucky pose near zero must not squeeze all the others.
+    low = std::max(low, usual / 30);
+    const auto rounded = [](double v, bool up) {
+      const double power = std::pow(10, std::floor(std::log10(v)));
+      double best = up ? 10 * power : power;
+      for (const double factor : {1.0, 2.0, 5.0}) {
+        if (up && factor * power >= v) return factor * power;
+        if (!up && factor * power <= v) best = factor * power;
+      }
+      return best;
+    };
+    return {rounded(low, false), rounded(high, true), true};
+  }
+  const double step = round_step(high, 5);
+  return {0, step * std::ceil(high / step - 1e-9), false};
+}
+
+double px(double share) { return left + share * (width - left - right); }
+double py(double share) { return height - bottom - share * (height - top - bottom); }
+
+/// The frame of a plot: title for those who do not see it, axes, what hangs on them.
+class Plot {
+ public:
+  explicit Plot(const std::string& described) {
+    svg_ = fmt::format(
+        "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\" "
+        "xmlns=\"http://www.w3.org/2000/svg\">\n",
+        width, height, escaped(described));
+  }
+
+  void x_axis(const std::vector<Tick>& ticks, const Scale& scale, const std::string& name) {
+    for (const Tick& t : ticks) {
+      const double x = px(scale.at(t.value));
+      line(x, py(0), x, py(0) + 4, "axis");
+      text(x, py(0) + 15, "middle", t.text);
+    }
+    line(px(0), py(0), px(1), py(0), "axis");
+    text(px(0.5), height - 5, "middle", name, "name");
+  }
+  void y_axis(const std::vector<Tick>& ticks, const Scale& scale, const std::string& name) {
+    for (const Tick& t : ticks) {
+      const double y = py(scale.at(t.value));
+      line(px(0), y, px(1), y, "grid");
+      text(px(0) - 5, y + 3.5, "end", t.text);
+    }
+    svg_ += fmt::format(
+        "<text class=\"name\" text-anchor=\"middle\" transform=\"translate(11 {:.1f}) "
+        "rotate(-90)\">{}</text>\n",
+        py(0.5), escaped(name));
+  }
+  void floor(double y) {
+    line(px(0), y, px(1), y, "floor");
+    text(px(1) - 2, y - 4, "end", "noise");
+  }
+  void line(double x1, double y1, double x2, double y2, const char* kind) {
+    svg_ += fmt::format("<path class=\"{}\" d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", kind, x1, y1, x2, y2);
+  }
+  void path(const std::string& d, const char* kind) {
+    if (!d.empty()) svg_ += fmt::format("<path class=\"{}\" d=\"{}\"/>\n", kind, d);
+  }
+  void text(double x, double y, const char* anchor, const std::string& what, const char* kind = "tick") {
+    svg_ += fmt::format("<text class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", kind,
+                        x, y, anchor, escaped(what));
+  }
+  std::string done() { return svg_ + "</svg>\n"; }
+
+ private:
+  std::string svg_;
+};
+
+/// A dot in a path whose lines have round ends.
+std::string dot(double x, double y) { return fmt::format("M{:.1f} {:.1f}h0", x, y); }
+
+std::string step_line(std::vector<double> values, const Scale& scale) {
+  std::sort(values.begin(), values.end());
+  std::string d;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const double x = px(scale.at(values[k]));
+    const auto n = static_cast<double>(values.size());
+    d += fmt::format("{}{:.1f} {:.1f}V{:.1f}", k == 0 ? "M" : "L", x, py(static_cast<double>(k) / n),
+                     py(static_cast<double>(k + 1) / n));
+  }
+  return d;
+}
+
+/// Classes of equal width on the scale.
+std::vector<std::size_t> counts(const std::vector<double>& values, const Scale& scale, std::size_t classes) {
+  std::vector<std::size_t> count(classes);
+  for (const double v : values) {
+    const auto k = static_cast<long>(std::floor(scale.at(v) * static_cast<double>(classes)));
+    ++count[static_cast<std::size_t>(std::clamp<long>(k, 0, static_cast<long>(classes) - 1))];
+  }
+  return count;
+}
+
+}  // namespace
+
+std::string plot_in_order(const ErrorPairs& errors) {
+  const Scale y = scale_of(errors);
+  const auto n = static_cast<double>(errors.before.size());
+  const Scale x{0.5 - 0.02 * n, n + 0.5 + 0.02 * n, false};
+  Plot plot("Error of each pose in the order of the data, before and after");
+  plot.y_axis(y.ticks(5), y, errors.unit);
+  std::vector<Tick> ticks;
+  for (Tick& t : x.ticks(6)) {
+    if (t.value >= 1 && t.value <= n && t.value == std::floor(t.value)) ticks.push_back(t);
+  }
+  plot.x_axis(ticks, x, "pose");
+  std::string stems, before, after;
+  for (std::size_t k = 0; k < errors.before.size(); ++k) {
+    const double at = px(x.at(static_cast<double>(k + 1)));
+    const double upper = py(y.at(errors.before[k])), lower = py(y.at(errors.after[k]));
+    if (errors.before.size() <= 120) stems += fmt::format("M{:.1f} {:.1f}V{:.1f}", at, upper, lower);
+    before += dot(at, upper);
+    after += dot(at, lower);
+  }
+  const bool many = errors.before.size() > 120;
+  plot.path(stems, "stem");
+  plot.path(before, many ? "fine before" : "dots before");
+  plot.path(after, many ? "fine after" : "dots after");
+  if (errors.floor) plot.floor(py(y.at(*errors.floor)));
+  return plot.done();
+}
+
+std::string plot_sorted(const ErrorPairs& errors) {
+  const Scale x = scale_of(errors);
+  const Scale y{0, 100, false};
+  Plot plot("Share of the poses whose error lies below a value, before and after");
+  plot.y_axis(y.ticks(4), y, "% of the poses below");
+  plot.x_axis(x.ticks(6), x, errors.unit);
+  if (errors.floor) {
+    const double at = px(x.at(*errors.floor));
+    plot.line(at, py(0), at, py(1), "floor");
+    plot.text(at + 3, py(0.06), "start", "noise");
+  }
+  plot.path(step_line(errors.before, x), "line before");
+  plot.path(step_line(errors.after, x), "line after");
+  return plot.done();
+}
+
+std::string plot_histogram(const ErrorPairs& errors) {
+  const Scale x = scale_of(errors);
+  const auto n = static_cast<double>(errors.before.size());
+  const auto classes = static_cast<std::size_t>(std::clamp(2 * std::cbrt(n) + 8, 12.0, 40.0));
+  const auto before = counts(errors.before, x, classes);
+  const auto after = counts(errors.after, x, classes);
+  std::size_t most = 1;
+  for (std::size_t k = 0; k < classes; ++k) most = std::max({most, before[k], after[k]});
+  const double step = std::max(1.0, round_step(static_cast<double>(most), 4));
+  const Scale y{0, step * std::ceil(static_cast<double>(most) / step), false};
+  Plot plot("How many poses have which error, before and after");
+  plot.y_axis(y.ticks(4), y, "poses");
+  const auto bars = [&](const std::vector<std::size_t>& count) {
+    std::string d;
+    for (std::size_t k = 0; k < classes; ++k) {
+      if (count[k] == 0) continue;
+      const double from = px(static_cast<double>(k) / static_cast<double>(classes)) + 0.5;
+      const double to = px(static_cast<double>(k + 1) / static_cast<double>(classes)) - 0.5;
+      d += fmt::format("M{:.1f} {:.1f}V{:.1f}H{:.1f}V{:.1f}Z", from, py(0),
+                       py(y.at(static_cast<double>(count[k]))), to, py(0));
+    }
+    return d;
+  };
+  plot.path(bars(before), "bars before");
+  plot.path(bars(after), "bars after");
+  plot.x_axis(x.ticks(6), x, errors.unit);
+  return plot.done();
+}
+
+std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint) {
+  double reach = 0, low = HUGE_VAL, high = -HUGE_VAL;
+  std::vector<double> sizes;
+  for (const PagePose& p : poses) {
+    for (const double e : p.after_m) sizes.push_back(std::abs(e) * 1e3);
+    low = std::min(low, degrees(p.q_rad[joint]));
+    high = std::max(high, degrees(p.q_rad[joint]));
+  }
+  if (!sizes.empty()) {
+    // Single outliers are drawn at the edge.
+    const auto most =
+        sizes.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(sizes.size() - 1) * 0.995);
+    std::nth_element(sizes.begin(), most, sizes.end());
+    reach = *most;
+  }
+  if (!(reach > 0)) reach = 1e-3;
+  const double step = round_step(reach, 2);
+  const Scale y{-step * std::ceil(reach / step - 1e-9), step * std::ceil(reach / step - 1e-9), false};
+  const double margin = std::max(1.0, 0.04 * (high - low));
+  const Scale x{low - margin, high + margin, false};
+  const std::string name = fmt::format("q{}", joint + 1);
+  Plot plot(fmt::format("What is left of the position error against the angle of joint {}", joint + 1));
+  plot.y_axis(y.ticks(4), y, "mm");
+  plot.x_axis(x.ticks(6), x, name + " [deg]");
+  static constexpr std::array<const char*, 3> kind{"dots x", "dots y", "dots z"};
+  static constexpr std::array<const char*, 3> fine{"fine x", "fine y", "fine z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::string d;
+    for (const PagePose& p : poses) {
+      d += dot(px(x.at(degrees(p.q_rad[joint]))), py(std::clamp(y.at(p.after_m[k] * 1e3), 0.0, 1.0)));
+    }
+    plot.path(d, poses.size() > 60 ? fine[k] : kind[k]);
+  }
+  return plot.done();
+}
+
+}  // namespace flexcomp::host

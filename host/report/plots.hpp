@@ -1,0 +1,35 @@
+/// \file
+/// The plots of a page as inline SVG. Colours come from the page's style sheet by class, so that one drawing serves
+/// light, dark and paper. Drawn for the width of a phone; wider screens put several beside each other.
+#ifndef FLEXCOMP_HOST_REPORT_PLOTS_HPP
+#define FLEXCOMP_HOST_REPORT_PLOTS_HPP
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "report/page.hpp"
+
+namespace flexcomp::host {
+
+/// Errors before and after over the same poses, in the unit in which they are shown.
+struct ErrorPairs {
+  std::vector<double> before;
+  std::vector<double> after;
+  std::string unit;  ///< "mm" or "deg"
+  std::optional<double> floor;
+};
+
+/// Each pose in the order of the data, before above after.
+std::string plot_in_order(const ErrorPairs& errors);
+/// Which share of the poses lies below which error.
+std::string plot_sorted(const ErrorPairs& errors);
+/// How many poses lie in which class of errors.
+std::string plot_histogram(const ErrorPairs& errors);
+/// The three components of the position error that is left, against each joint's angle: what has a shape is not noise.
+std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,68 @@
+/// \file
+/// The style sheet of a page: light, dark, phone and paper.
+#ifndef FLEXCOMP_HOST_REPORT_STYLE_HPP
+#define FLEXCOMP_HOST_REPORT_STYLE_HPP
+
+namespace flexcomp::host {
+
+// Before is orange, after is blue: told apart by those who do not see red and green.
+constexpr const char* page_style = R"css(
+:root { color-scheme: light dark; --paper: #ffffff; --ink: #1c2430; --soft: #5a6472; --grid: #e3e7ec; --axis: #8b95a3;
+  --before: #d9730d; --after: #1a66b0; --floor: #4f7d4a; --x: #c0392b; --y: #1f8a4c; --z: #3a5fcd; --box: #f5f7f9;
+  --warn: #fff3dc; --warn-edge: #d9960d; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --paper: #14181e; --ink: #e4e8ee; --soft: #9aa5b3; --grid: #2a313b; --axis: #6c7786; --before: #f0a04b;
+    --after: #6db3f2; --floor: #8fc487; --x: #f08070; --y: #62cf8e; --z: #8fa8ff; --box: #1c222a; --warn: #33290f;
+    --warn-edge: #d9a53c; }
+}
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto,
+  "DejaVu Sans", sans-serif; }
+main { max-width: 1080px; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.6rem; line-height: 1.25; margin: .6rem 0 .4rem; }
+h2 { font-size: 1.2rem; margin: 2rem 0 .4rem; border-top: 1px solid var(--grid); padding-top: 1rem; }
+h3 { font-size: 1rem; margin: 1.4rem 0 .2rem; }
+p { margin: .4rem 0; max-width: 46rem; }
+.lead { font-size: 1.1rem; }
+.headline { font-size: 1.7rem; font-weight: 600; font-variant-numeric: tabular-nums; max-width: none; }
+.headline small { font-size: .95rem; font-weight: 400; color: var(--soft); }
+.headline .before { color: var(--before); } .headline .after { color: var(--after); }
+.doubts { background: var(--warn); border-left: 4px solid var(--warn-edge); padding: .2rem 1rem; margin: 1rem 0; }
+.doubts h2 { border: 0; margin: .4rem 0; padding: 0; }
+.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: .5rem; margin: 1rem 0; }
+.facts div { background: var(--box); padding: .4rem .7rem; border-radius: 4px; }
+dt { color: var(--soft); font-size: .8rem; } dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .6rem 0; }
+th, td { padding: .15rem .8rem .15rem 0; text-align: right; white-space: nowrap; }
+th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--soft); font-weight: 400; font-size: .85rem; }
+tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
+.parameters { font-size: .9rem; } .parameters td:nth-child(4) { text-align: left; }
+.scroll { overflow-x: auto; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, 100%), 1fr)); gap: .6rem 1.2rem; }
+figure { margin: .4rem 0; min-width: 0; max-width: 560px; } figcaption { color: var(--soft); font-size: .85rem; }
+svg { display: block; width: 100%; height: auto; }
+svg text { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; fill: var(--soft); }
+svg text.name { fill: var(--ink); }
+path { fill: none; stroke-width: 1; } .grid { stroke: var(--grid); } .axis { stroke: var(--axis); }
+.stem { stroke: var(--axis); stroke-opacity: .45; } .floor { stroke: var(--floor); stroke-dasharray: 4 3; }
+.line { stroke-width: 2; stroke-linejoin: round; } .dots { stroke-width: 5; stroke-linecap: round; }
+.fine { stroke-width: 2; stroke-linecap: round; stroke-opacity: .7; }
+path.before { stroke: var(--before); } path.after { stroke: var(--after); }
+.bars { fill-opacity: .35; } .bars.before { fill: var(--before); } .bars.after { fill: var(--after); }
+path.x { stroke: var(--x); } path.y { stroke: var(--y); } path.z { stroke: var(--z); }
+.key { color: var(--soft); font-size: .9rem; }
+.mark { display: inline-block; width: .7em; height: .7em; border-radius: 50%; }
+.mark.before { background: var(--before); } .mark.after { background: var(--after); }
+.mark.x { background: var(--x); } .mark.y { background: var(--y); } .mark.z { background: var(--z); }
+code { font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: .9em; } a { color: var(--after); }
+footer { color: var(--soft); font-size: .85rem; margin: 2.5rem 0 1rem; border-top: 1px solid var(--grid); padding-top: .5rem; }
+@media print {
+  body { font-size: 10pt; } main { max-width: none; padding: 0; } .plots { grid-template-columns: 1fr 1fr; }
+  figure, tr, .doubts, .facts div { break-inside: avoid; } h2, h3 { break-after: avoid; } .scroll { overflow: visible; }
+  * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+}
+)css";
+
+}  // namespace flexcomp::host
+
+#endif
