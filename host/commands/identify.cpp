@@ -12,7 +12,9 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "errors.hpp"
+#include "files/write_file.hpp"
 #include "measurement/observation.hpp"
+#include "report/results.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -32,6 +34,7 @@ struct Identify {
   std::string model = "full";
   std::string frames;
   std::string out;
+  std::string report;
   bool force = false;
   bool plain = false;
 
@@ -136,6 +139,10 @@ void Identify::run() const {
                      {"before", to_json(r.before)},
                      {"after", to_json(r.after)},
                      {"values", parameters}});
+  if (!report.empty()) {
+    write_file(report, html(page_of(r, rows, robot_file, data)));
+    common.say(report + ": written");
+  }
   if (r.doubts.empty()) return;
   std::string message = joined(r.doubts);
   if (!r.cure.empty()) {
@@ -173,6 +180,7 @@ void add_identify(CLI::App& app) {
       ->check(CLI::IsMember(frame_choices));
   command->add_option("-o,--output", options->out, "Calibration file")->type_name("CAL.yaml")->required();
   command->add_flag("--plain", options->plain, "Every row counts in full: no protection from outliers");
+  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
   add_force_option(*command, options->force);
   options->common.add_seed_to(*command);
   options->common.add_to(*command);

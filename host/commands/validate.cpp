@@ -10,7 +10,9 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "errors.hpp"
+#include "files/write_file.hpp"
 #include "measurement/observation.hpp"
+#include "report/results.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -20,6 +22,7 @@ struct Validate {
   std::string robot;
   std::string calibration;
   std::string data;
+  std::string report;
   bool force = false;
 
   void run() const;
@@ -41,6 +44,10 @@ void Validate::run() const {
                      {"poses", rows.size()},
                      {"chi2_per_dof", v.chi2_per_dof()},
                      {"degrees_of_freedom", v.degrees_of_freedom}});
+  if (!report.empty()) {
+    write_file(report, html(page_of(v, rows, robot_file, set, data)));
+    common.say(report + ": written");
+  }
   if (!v.doubts.empty()) throw DoubtfulResult(fmt::format("{}: {}", calibration, joined(v.doubts)));
 }
 
@@ -57,6 +64,7 @@ void add_validate(CLI::App& app) {
   command->add_option("--data", options->data, "Measured data that were not fitted [deg, mm]")
       ->type_name("V.csv")
       ->required();
+  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
   add_force_option(*command, options->force);
   options->common.add_to(*command);
   command->footer(

@@ -209,6 +209,7 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
                               (options.frames == FrameChoice::by_distance &&
                                nominal_frames_are_off(residuals(nominal, *nominal_model, rows), rows));
   if (!fit_frames_too) start = Estimate();
+  out.nominal = residuals(start, *nominal_model, rows);
 
   ParametricModel paper = paper_model(robot.nominal, options.model, !fit_frames_too);
   out.parameters = paper.parameters.size();

@@ -44,6 +44,7 @@ struct Identification {
   double o1 = 0;         ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
   Before before;
   ErrorStatistics after;
+  std::vector<RowResidual> nominal;    ///< before, in fitted frames where the model has them, per row
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<std::size_t> outliers;   ///< rows that do not count in full, by index
   /// Why the result must not be relied on; empty where it may.
