@@ -93,8 +93,11 @@ class Server {
   bool ready(int fd) const {
     pollfd p{fd, POLLIN, 0};
     while (!stop_) {
-      if (::poll(&p, 1, 5) > 0) return (p.revents & POLLIN) != 0;
-      if (serial_ && (p.revents & POLLHUP) != 0) std::this_thread::sleep_for(milliseconds(1));
+      if (::poll(&p, 1, 5) <= 0) continue;
+      if ((p.revents & POLLIN) != 0) return true;
+      if (!serial_) return false;
+      // Nobody has the line open at the moment.
+      std::this_thread::sleep_for(milliseconds(1));
     }
     return false;
   }
