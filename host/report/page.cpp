@@ -123,7 +123,7 @@ std::string poses_section(const PagePoses& set) {
         fmt::format("<p>{} of {} poses lie far from the rest and do not count in full: {}{}.</p>\n", outliers,
                     set.poses.size(), which, static_cast<std::size_t>(outliers) > named ? ", …" : "");
   }
-  out += "<div class=\"plots\">\n";
+  out += "<div class=\"plots wide\">\n";
   out += figure(plot_in_order(position), "Position error of each pose, in the order of the data.");
   out += figure(plot_sorted(position),
                 "The same, sorted: the share of the poses whose error lies below a value.");
@@ -135,9 +135,9 @@ std::string poses_section(const PagePoses& set) {
       "</div>\n<h3>What is left, against each joint</h3>\n"
       "<p>The three components of the position error after: "
       "<span class=\"mark x\"></span> x, <span class=\"mark y\"></span> y, <span class=\"mark z\"></span> z. "
-      "Noise has no "
-      "shape here; a curve or a slope is an effect that the model does not have.</p>\n<div "
-      "class=\"plots\">\n";
+      "Noise has no shape here; a curve or a slope is an effect that the model does not have. Poses far off "
+      "the others "
+      "are drawn at the edge.</p>\n<div class=\"plots\">\n";
   for (std::size_t j = 0; j < joint_count; ++j) {
     out += figure(plot_against_joint(set.poses, j), fmt::format("Joint {}.", j + 1));
   }

@@ -264,11 +264,10 @@ std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t j
     high = std::max(high, degrees(p.q_rad[joint]));
   }
   if (!sizes.empty()) {
-    // Single outliers are drawn at the edge.
-    const auto most =
-        sizes.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(sizes.size() - 1) * 0.995);
-    std::nth_element(sizes.begin(), most, sizes.end());
-    reach = *most;
+    // The bulk sets the scale; what lies far off is drawn at the edge.
+    std::sort(sizes.begin(), sizes.end());
+    const double bulk = sizes[static_cast<std::size_t>(static_cast<double>(sizes.size() - 1) * 0.9)];
+    reach = std::min(sizes.back(), 3 * bulk);
   }
   if (!(reach > 0)) reach = 1e-3;
   const double step = round_step(reach, 2);

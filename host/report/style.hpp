@@ -36,9 +36,10 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .
 th, td { padding: .15rem .8rem .15rem 0; text-align: right; white-space: nowrap; }
 th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--soft); font-weight: 400; font-size: .85rem; }
 tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
-.parameters { font-size: .9rem; } .parameters td:nth-child(4) { text-align: left; }
+.parameters { font-size: .9rem; } .parameters :is(td, th):nth-child(4) { text-align: left; }
 .scroll { overflow-x: auto; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, 100%), 1fr)); gap: .6rem 1.2rem; }
+.plots.wide { grid-template-columns: repeat(auto-fit, minmax(min(400px, 100%), 1fr)); }
 figure { margin: .4rem 0; min-width: 0; max-width: 560px; } figcaption { color: var(--soft); font-size: .85rem; }
 svg { display: block; width: 100%; height: auto; }
 svg text { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; fill: var(--soft); }
