@@ -29,8 +29,13 @@ constexpr Unit degree_per_hour{"deg/h", pi, 648000};
 }  // namespace unit
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double radians(double degrees) { return degrees * (pi / 180); }
-constexpr double degrees(double radians) { return radians * (180 / pi); }
+/// Rounded once, as parse_si() does: radians(133.5) is what a file's 133.5 becomes.
+constexpr double radians(double degrees) {
+  return static_cast<double>(static_cast<long double>(degrees) * unit::pi / 180);
+}
+constexpr double degrees(double radians) {
+  return static_cast<double>(static_cast<long double>(radians) * 180 / unit::pi);
+}
 
 /// Whole text to SI: an optional sign, digits, an optional exponent; nothing before or after. Unit conversion happens
 /// in long double and is rounded once. Nothing where the text is not a finite number.

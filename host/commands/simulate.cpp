@@ -38,9 +38,12 @@ constexpr double largest_move_rad = radians(30);
 constexpr double seconds_per_pose = 60;
 constexpr double temperature_spread_k = 8;
 
-/// To the micro-degree, as a controller displays it: files that people can read.
-double rounded_angle(double rad) { return *parse_si(fmt::format("{:.6f}", degrees(rad)), unit::degree); }
-double rounded(double value, double step) { return std::round(value / step) * step; }
+/// A value with so many decimals in its file's unit: files that people can read.
+double rounded(double si, int decimals, const Unit& unit) {
+  return *parse_si(fmt::format("{:.{}f}", si / unit.si_per_file_unit(), decimals), unit);
+}
+/// To the micro-degree, finer than any controller displays it.
+double rounded_angle(double rad) { return rounded(rad, 6, unit::degree); }
 
 struct Simulate {
   CommonOptions common;
@@ -73,10 +76,10 @@ void Simulate::random_context(std::size_t k, const RobotFile& robot_file, std::m
   }
   for (std::size_t j = 0; j < joint_count && largest > 0; ++j)
     row.context.relative_speed[j] = row.move_rad[j] / largest;
-  row.context.temperature_c =
-      rounded(robot_file.nominal.reference_temperature_c + temperature_spread_k * symmetric(random), 0.01);
+  row.context.temperature_c = rounded(
+      robot_file.nominal.reference_temperature_c + temperature_spread_k * symmetric(random), 2, unit::si);
   row.context.time_s =
-      rounded(seconds_per_pose * (static_cast<double>(k) + 0.2 * symmetric(random) + 0.2), 0.1);
+      rounded(seconds_per_pose * (static_cast<double>(k) + 0.2 * symmetric(random) + 0.2), 1, unit::si);
 }
 
 /// What the instrument says about a true pose.

@@ -66,9 +66,10 @@ std::optional<std::size_t> CsvTable::find(std::string_view name) const {
   return {};
 }
 
-std::size_t CsvTable::require(std::string_view name, std::string_view purpose) const {
+std::size_t CsvTable::require(std::string_view name, std::string_view purpose,
+                              std::span<const std::string> candidates) const {
   if (const auto column = find(name)) return *column;
-  const std::string near = nearest(name, header);
+  const std::string near = nearest(name, candidates);
   throw InputError(path, 1, std::string(name), fmt::format("this column ({})", purpose),
                    near.empty() ? fmt::format("none; the columns are {}", fmt::join(header, ", "))
                                 : fmt::format("none, but '{}'", near));

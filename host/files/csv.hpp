@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,8 +29,10 @@ class CsvTable {
   std::optional<std::size_t> find(std::string_view name) const;
   bool has(std::string_view name) const { return find(name).has_value(); }
 
-  /// Index of a column that must be there. \throws InputError naming the column, what it is for, and what comes near
-  std::size_t require(std::string_view name, std::string_view purpose) const;
+  /// Index of a column that must be there. `candidates` are columns that it could have been meant by.
+  /// \throws InputError naming the column, what it is for, and what comes near
+  std::size_t require(std::string_view name, std::string_view purpose,
+                      std::span<const std::string> candidates = {}) const;
 
   /// A cell in SI. \throws InputError file:line: column where it is empty or no finite number
   double number(const CsvRow& row, std::size_t column, const Unit& unit) const;

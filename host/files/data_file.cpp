@@ -42,21 +42,28 @@ std::string point_name(std::size_t r, std::size_t k) {
 }
 
 /// Every name that has a meaning in data files and targets, for hints.
-std::vector<std::string> known_names() {
-  std::vector<std::string> names;
-  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(joint_name(j));
-  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(seed_name(j));
-  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(move_name(j));
-  for (std::size_t j = 0; j < joint_count; ++j) names.push_back(direction_name(j));
-  for (std::size_t k = 0; k < 3; ++k) {
-    names.push_back(position_name(k));
-    names.push_back(com_name(k));
-    names.push_back(force_name(k));
-    for (std::size_t r = 0; r < 4; ++r) names.push_back(point_name(r, k));
-  }
-  names.insert(names.end(), quaternion_names.begin(), quaternion_names.end());
-  names.insert(names.end(), {"payload_kg", "temp_c", "time_s", "sigma_mm", "sigma_deg"});
-  return names;
+const std::vector<std::string>& known_names() {
+  static const std::vector<std::string> all = [] {
+    std::vector<std::string> names;
+    for (std::size_t j = 0; j < joint_count; ++j) names.push_back(joint_name(j));
+    for (std::size_t j = 0; j < joint_count; ++j) names.push_back(seed_name(j));
+    for (std::size_t j = 0; j < joint_count; ++j) names.push_back(move_name(j));
+    for (std::size_t j = 0; j < joint_count; ++j) names.push_back(direction_name(j));
+    for (std::size_t k = 0; k < 3; ++k) {
+      names.push_back(position_name(k));
+      names.push_back(com_name(k));
+      names.push_back(force_name(k));
+      for (std::size_t r = 0; r < 4; ++r) names.push_back(point_name(r, k));
+    }
+    names.insert(names.end(), quaternion_names.begin(), quaternion_names.end());
+    names.insert(names.end(), {"payload_kg", "temp_c", "time_s", "sigma_mm", "sigma_deg"});
+    return names;
+  }();
+  return all;
+}
+
+bool is_known(const std::string& name) {
+  return std::find(known_names().begin(), known_names().end(), name) != known_names().end();
 }
 
 /// Reads the columns that data files and targets have in common, and remembers which ones it used.
@@ -88,7 +95,11 @@ class ColumnReader {
     return column;
   }
   std::size_t require(const std::string& name, std::string_view purpose) {
-    const std::size_t column = table_.require(name, purpose);
+    std::vector<std::string> strange;
+    for (const std::string& h : table_.header) {
+      if (!is_known(h)) strange.push_back(h);
+    }
+    const std::size_t column = table_.require(name, purpose, strange);
     used_[column] = true;
     return column;
   }
@@ -184,21 +195,20 @@ class ColumnReader {
             largest, table_.rows.size()));
   }
 
-  /// Columns that nobody used, with a warning.
-  std::vector<std::size_t> unused(std::vector<std::string>& names, std::vector<std::string>& warnings) const {
-    static const std::vector<std::string> known = known_names();
+  /// Columns that mean nothing here, with a warning each. What has a meaning elsewhere (a measured position beside
+  /// joints that are all that is asked for) is left out silently: it would be wrong beside what is answered.
+  std::vector<std::size_t> unknown(std::vector<std::string>& names,
+                                   std::vector<std::string>& warnings) const {
     std::vector<std::size_t> columns;
     for (std::size_t k = 0; k < used_.size(); ++k) {
-      if (used_[k]) continue;
       const std::string& name = table_.header[k];
-      const std::string near = nearest(name, known);
+      if (used_[k] || is_known(name)) continue;
+      const std::string near = nearest(name, known_names());
       columns.push_back(k);
       names.push_back(name);
-      const bool is_known = near == name;
-      warnings.push_back(
-          fmt::format("{}: column '{}' {}{}.", table_.path, name,
-                      is_known ? "is not used here" : "has no meaning here and is passed through",
-                      near.empty() || is_known ? "" : fmt::format(" (did you mean '{}'?)", near)));
+      warnings.push_back(fmt::format("{}:1: column '{}' has no meaning here and is passed through{}.",
+                                     table_.path, name,
+                                     near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near)));
     }
     return columns;
   }
@@ -330,7 +340,7 @@ DataFile load(const std::string& path, const RobotFile& robot, const LoadOptions
   data.kind = columns.kind;
   data.reflectors = columns.reflectors;
   data.columns = reader.columns();
-  const std::vector<std::size_t> extra = reader.unused(data.extra, data.warnings);
+  const std::vector<std::size_t> extra = reader.unknown(data.extra, data.warnings);
   const CsvTable& table = reader.table();
   if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
   reader.suspect_radians(joints, options);
@@ -479,7 +489,7 @@ TargetsFile load_targets(const std::string& path, const RobotFile& robot, const 
   } else {
     joints = reader.require_joints(joint_name, choice);
   }
-  const std::vector<std::size_t> extra = reader.unused(targets.extra, targets.warnings);
+  const std::vector<std::size_t> extra = reader.unknown(targets.extra, targets.warnings);
   const CsvTable& table = reader.table();
   if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
   reader.suspect_radians(joints, options);
