@@ -29,6 +29,7 @@
 
 #include "flexcomp_config.h"
 
+/* NOLINTBEGIN(modernize-use-using): this is C */
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -263,5 +264,6 @@ void flexcomp_tcp_reset(flexcomp_tcp* tcp);
 #ifdef __cplusplus
 }
 #endif
+/* NOLINTEND(modernize-use-using) */
 
 #endif

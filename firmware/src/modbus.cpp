@@ -185,22 +185,22 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
   return Exception::none;
 }
 
-Exception ModbusServer::apply(std::uint32_t address, std::uint32_t n, const std::uint8_t* from) {
+Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, const std::uint8_t* from) {
   const BlockPlace* b = block_at(address);
   if (b == nullptr) return Exception::illegal_data_address;
   const std::uint32_t first = address - b->address;
   switch (b->block) {
     case Block::argument:
-      patch32(argument_, first, n, from);
+      patch32(argument_, first, quantity, from);
       return Exception::none;
     case Block::command:
       command_ = be16(from);
       return exception_of(device_.store().run(static_cast<wire::Command>(command_), argument_, origin_));
     case Block::staging_offset:
-      patch32(staging_offset_, first, n, from);
+      patch32(staging_offset_, first, quantity, from);
       return Exception::none;
     case Block::staging_window: {
-      std::uint32_t size = 2 * n;
+      std::uint32_t size = 2 * quantity;
       // Offset arithmetic must not wrap; far beyond any image it is refused by the store.
       const std::uint32_t at = staging_offset_ < 0x80000000U ? staging_offset_ + 2 * first : 0x80000000U;
       const std::uint32_t announced = device_.store().announced_bytes();
@@ -208,11 +208,11 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t n, const std:
       return exception_of(device_.store().write(at, from, size, origin_));
     }
     case Block::reading_offset:
-      patch32(reading_offset_, first, n, from);
+      patch32(reading_offset_, first, quantity, from);
       return Exception::none;
     case Block::probe_request:
       std::memcpy(probe_request_.data() + 2 * static_cast<std::size_t>(first), from,
-                  2 * static_cast<std::size_t>(n));
+                  2 * static_cast<std::size_t>(quantity));
       return Exception::none;
     case Block::probe_trigger: {
       trigger_ = be16(from);

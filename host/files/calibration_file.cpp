@@ -540,13 +540,16 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   for (const auto& [key, value] : c.residuals)
     text += fmt::format("  {}: {}\n", key, number(value, unit::si));
   if (c.covariance) {
-    text += "covariance_factor:  # covariance = factor * factor^T, SI units (m, rad, rad/(N m)); lower triangle\n";
+    text +=
+        "covariance_factor:  # covariance = factor * factor^T, SI units (m, rad, rad/(N m)); lower "
+        "triangle\n";
     for (Eigen::Index r = 0; r < c.covariance->factor.rows(); ++r) {
       std::vector<std::string> row;
       for (Eigen::Index k = 0; k <= r; ++k)
         row.push_back(yaml_number(fmt::format("{:.9g}", c.covariance->factor(r, k))));
-      text += fmt::format("  - {{parameter: {}, row: [{}]}}\n",
-                          quoted(c.covariance->parameters[static_cast<std::size_t>(r)]), fmt::join(row, ", "));
+      text +=
+          fmt::format("  - {{parameter: {}, row: [{}]}}\n",
+                      quoted(c.covariance->parameters[static_cast<std::size_t>(r)]), fmt::join(row, ", "));
     }
   }
   return text;
