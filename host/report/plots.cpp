@@ -51,7 +51,7 @@ double round_step(double range, int about) {
 std::vector<Tick> Scale::ticks(int about) const {
   std::vector<Tick> found;
   if (log) {
-    const bool few = high / low < 300;  // 2 and 5 are named where there is room
+    const bool few = high / low < 1000;  // 2 and 5 are named where there is room
     for (int e = static_cast<int>(std::floor(std::log10(low))); std::pow(10, e) <= high * 1.001; ++e) {
       for (const int factor : {1, 2, 5}) {
         const double v = factor * std::pow(10, e);
