@@ -38,7 +38,7 @@ class YamlField {
   YamlField at(const std::string& key) const;  ///< \throws InputError where the key is missing
   std::vector<std::string> keys() const;       ///< of a mapping, in the order of the file
 
-  /// A sequence. \throws InputError
+  /// A sequence; items are named from 1, as joints and links are (joints[3] is joint 3). \throws InputError
   std::vector<YamlField> items() const;
 
   std::string text() const;  ///< a non-empty scalar
