@@ -33,6 +33,11 @@ expect("says that no real data ran", "REAL DATA: not run" in log)
 sys.exit(1 if wrong else 0)
 PYTHON
 
+# README shows these numbers.
+sed -n '/^<!-- demo -->/,/^```$/p' "$source"/README.md | grep -E '^(before|after):' >shown
+[ "$(wc -l <shown)" -eq 2 ]
+grep -E '^(before|after):' log | diff - shown || { echo "FAILED: README.md shows other numbers (>) than ./demo (<)"; exit 1; }
+
 # Without programs it says so.
 if "$source"/demo --no-build --bin "$work" --out x >log 2>&1; then echo "FAILED: ran without programs"; exit 1; fi
 grep -q 'flexcomp is not there' log || { cat log; exit 1; }
