@@ -63,7 +63,7 @@ inline std::vector<Term<Scalar>> some_terms(double size, std::uint32_t seed) {
 inline Bytes make_image(const Robot& robot, std::uint32_t sequence, double size = 1, std::uint32_t seed = 1) {
   const std::vector<Term<Scalar>> terms = some_terms(size, seed);
   std::vector<Scalar> values;
-  for (int k = 0; k < 16; ++k) values.push_back(static_cast<Scalar>(1e-4 * size * std::sin(k + seed)));
+  for (unsigned k = 0; k < 16; ++k) values.push_back(static_cast<Scalar>(1e-4 * size * std::sin(k + seed)));
   Table table;
   table.size = 16;
   ImageHeader header;

@@ -114,7 +114,9 @@ TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
       if (arm.device->status().state == 0 && next < 20) arm.stage(images[next]);
       const int what = static_cast<int>(random() % 4);
       if (what < 2 && arm.run(Command::commit) == Answer::accepted) ++next;
-      if (what == 2 && arm.run(Command::commit_trial, 30 + k % 50) == Answer::accepted) ++next;
+      if (what == 2 &&
+          arm.run(Command::commit_trial, static_cast<std::uint32_t>(30 + k % 50)) == Answer::accepted)
+        ++next;
       if (what == 3) arm.run(Command::rollback);
       if (k % 370 == 0) arm.run(Command::abort), arm.run(Command::restore_defaults);
       if (next == 20) arm.run(Command::restore_defaults), next = 0;
