@@ -62,6 +62,13 @@ void ControlCycle::track(const Joints& q) {
   last_command_ = q;
 }
 
+// What fades or is held must not push a joint beyond a limit that the command itself respects.
+Scalar ControlCycle::within_limits(std::size_t joint, Scalar q_command, Scalar q) const {
+  const Scalar low = q_command < lower_[joint] ? q_command : lower_[joint];
+  const Scalar high = q_command > upper_[joint] ? q_command : upper_[joint];
+  return q < low ? low : q > high ? high : q;
+}
+
 void ControlCycle::publish(StepStatus status) {
   count(publication_.cycles);
   count(publication_.cycles_by_status[static_cast<std::size_t>(status)]);
@@ -87,7 +94,7 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
     if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
     if (settings_.on_refusal == OnRefusal::hold_last_correction) {
       for (std::size_t j = 0; j < joints; ++j) {
-        if (is_finite(out.q[j])) out.q[j] += correction_[j];
+        if (is_finite(out.q[j])) out.q[j] = within_limits(j, out.q[j], out.q[j] + correction_[j]);
       }
     }
     publish(out.status);
@@ -113,7 +120,9 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
   }
 
   if (source == Source::hold) {
-    for (std::size_t j = 0; j < joints; ++j) out.q[j] = q_command_rad[j] + correction_[j];
+    for (std::size_t j = 0; j < joints; ++j) {
+      out.q[j] = within_limits(j, q_command_rad[j], q_command_rad[j] + correction_[j]);
+    }
     fade_left_ = 0;
   } else {
     if (changed || source != source_) {
@@ -124,15 +133,17 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
       const Scalar v = static_cast<Scalar>(fade_left_) * fade_step_;
       const Scalar weight = v * v * (Scalar(3) - Scalar(2) * v);
       for (std::size_t j = 0; j < joints; ++j) {
+        // Where the arm moves on, what is kept comes on top of a correction that is another one by now.
+        const Scalar largest = settings_.compensation.largest_correction_rad;
+        const Scalar least = q_command_rad[j] - largest;
+        const Scalar most = q_command_rad[j] + largest;
         Scalar q = out.q[j] + kept_[j] * weight;
-        // What fades must not push a joint beyond a limit that the command itself respects.
-        const Scalar low = q_command_rad[j] < lower_[j] ? q_command_rad[j] : lower_[j];
-        const Scalar high = q_command_rad[j] > upper_[j] ? q_command_rad[j] : upper_[j];
-        if (q < low || q > high) {
-          q = q < low ? low : high;
-          if (source == Source::set) out.status = StepStatus::at_limit;
+        if (q < least || q > most) {
+          q = q < least ? least : most;
+          if (source == Source::set && out.status != StepStatus::at_limit) out.status = StepStatus::limited;
         }
-        out.q[j] = q;
+        out.q[j] = within_limits(j, q_command_rad[j], q);
+        if (source == Source::set && (out.q[j] < q || out.q[j] > q)) out.status = StepStatus::at_limit;
       }
       --fade_left_;
     }

@@ -234,6 +234,57 @@ TEST(Step, FadesStayWithinTheLimits) {
   }
 }
 
+// A held correction must not take a joint over a limit that its command respects, and where the command comes
+// back the output moves no farther than the command does.
+TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
+  DeviceSettings settings;
+  settings.control.fade_cycles = 200;
+  settings.control.on_refusal = OnRefusal::hold_last_correction;
+  Flash flash;
+  Arm arm(flash, settings);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  const Joints q = {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)};
+  Joints good{};
+  for (int k = 0; k < 300; ++k) good = arm.step(q).q;
+  Joints end = q;
+  for (std::size_t j = 0; j < joints; ++j) end[j] = good[j] > q[j] ? real(2.2) : real(-2.2);
+  FirmwareContext unknown = default_context<Scalar>(arm.robot);
+  unknown.temperature_c = std::numeric_limits<Scalar>::quiet_NaN();
+  const StepResult held = arm.device->step(end, unknown);
+  EXPECT_EQ(held.status, StepStatus::refused);
+  EXPECT_EQ(held.q, end);
+  Joints broken = end;
+  broken[5] = std::numeric_limits<Scalar>::quiet_NaN();
+  const StepResult r = arm.step(broken);
+  for (std::size_t j = 0; j < 5; ++j) EXPECT_EQ(r.q[j], end[j]);
+  // Off the limit again the whole correction is still there; and from the limit the recovery is no jump.
+  const StepResult off = arm.device->step(q, unknown);
+  for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(off.q[j], good[j], 1e-6);
+  arm.device->step(end, unknown);
+  const StepResult back = arm.step(end);
+  for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(back.q[j], end[j], 1e-6);
+}
+
+// Also while a set fades in and the arm moves on meanwhile.
+TEST(Step, NoJointIsEverCorrectedByMoreThanTheLargestCorrection) {
+  DeviceSettings settings;
+  settings.control.fade_cycles = 100;
+  settings.control.compensation.largest_correction_rad = real(1e-4);
+  Flash flash;
+  Arm arm(flash, settings);
+  std::mt19937 random(9);
+  for (std::uint32_t n = 1; n <= 10; ++n) {
+    ASSERT_EQ(arm.stage(make_image(arm.robot, n, 4, n)), Answer::accepted);
+    ASSERT_EQ(arm.run(Command::commit), Answer::accepted);
+    for (int k = 0; k < 300; ++k) {
+      arm.device->store().poll(++arm.now_ms);
+      const Joints q = some_pose(random);
+      const StepResult r = arm.step(q);
+      for (std::size_t j = 0; j < joints; ++j) ASSERT_LE(std::abs(r.q[j] - q[j]), real(1.005e-4)) << k;
+    }
+  }
+}
+
 TEST(Step, TracksTheDirectionThroughADeadBand) {
   DeviceSettings settings;
   settings.control.direction_band_rad = real(1e-3);

@@ -81,6 +81,7 @@ class ControlCycle {
   enum class Source : std::uint8_t { pass, set, hold };
 
   void track(const Joints& q);
+  Scalar within_limits(std::size_t joint, Scalar q_command, Scalar q) const;
   void publish(StepStatus status);
 
   ParameterSets& sets_;
