@@ -459,7 +459,7 @@ void Store::work() {
       progress_ += size;
       if (progress_ != incoming_.bytes) break;
       if (!job_trial_) {
-        job_ = Job::seal;
+        job_ = active_.slot == wire::no_slot ? Job::clear_stale : Job::seal;
         break;
       }
       previous_ = active_;
@@ -478,7 +478,17 @@ void Store::work() {
         return;
       }
       job_trial_ = true;
-      job_ = Job::seal;
+      job_ = previous_.slot == wire::no_slot ? Job::clear_stale : Job::seal;
+      break;
+    case Job::clear_stale:
+      // A set that was refused at the start (limits of this firmware, a reading error) may carry a higher
+      // sequence: it must not come back at a later start in place of the one that is taken in now.
+      r = storage_.erase(storage_.user, incoming_.slot == 0 ? 1U : 0U);
+      if (r == StorageResult::done) job_ = Job::seal;
+      if (r == StorageResult::failed && job_trial_) {
+        make_active(previous_);
+        previous_ = Set{};
+      }
       break;
     case Job::seal: {
       std::uint8_t seal[seal_bytes] = {};
@@ -492,10 +502,14 @@ void Store::work() {
         Set written;
         if (!read_seal(incoming_.slot, written) || written.crc != incoming_.crc) r = StorageResult::failed;
       }
-      if (r == StorageResult::failed && job_trial_) {
-        // Confirmed but not written down: what runs must be what the next start would bring.
-        make_active(previous_);
-        previous_ = Set{};
+      if (r == StorageResult::failed) {
+        // Not written down for certain: what runs must be what the next start would bring.
+        if (job_trial_) {
+          make_active(previous_);
+          previous_ = Set{};
+        }
+        job_ = Job::drop_incoming;
+        return;
       }
       if (r != StorageResult::done) break;
       if (!job_trial_) {
@@ -507,6 +521,10 @@ void Store::work() {
       finish(Answer::accepted);
       break;
     }
+    case Job::drop_incoming:
+      r = storage_.erase(storage_.user, incoming_.slot);
+      if (r == StorageResult::done) r = StorageResult::failed;  // the commit has failed all the same
+      break;
     case Job::drop_active:
       r = active_.slot == wire::no_slot ? StorageResult::done : storage_.erase(storage_.user, active_.slot);
       if (r != StorageResult::done) break;

@@ -228,6 +228,22 @@ int main(void) {
     EXPECT(flexcomp_tcp_receive(tcp, rubbish, sizeof rubbish) == 0);
     flexcomp_tcp_reset(tcp);
   }
+  /* Connections come and go while CAN stages: none of them is ever taken for the CAN node. */
+  {
+    const uint8_t download[8] = {0x21, 0x10, 0x20, 1, 200, 0, 0, 0};
+    const uint8_t abort[8] = {0x80, 0x10, 0x20, 1, 0, 0, 0, 8};
+    flexcomp_can_receive(can, 0x603, download, 8);
+    for (j = 0; j < 600; ++j) {
+      tcp = flexcomp_tcp_init(&tcp_memory, sizeof tcp_memory, fc, 1, send_bytes, NULL);
+      flexcomp_tcp_reset(tcp);
+    }
+    flexcomp_get_state(fc, &state);
+    EXPECT(state.store == 1);
+    EXPECT(run(tcp, 7, 0) == 0x90);
+    flexcomp_can_receive(can, 0x603, abort, 8);
+    flexcomp_get_state(fc, &state);
+    EXPECT(state.store == 0);
+  }
   EXPECT(flexcomp_command(fc, FLEXCOMP_COMMAND_ROLLBACK) == 7);
 
   /* The next start. */

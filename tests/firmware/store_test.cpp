@@ -376,6 +376,37 @@ TEST(Store, FailingMemoryChangesNothingThatRuns) {
   EXPECT_EQ(bare.store().run(Command::commit, 0, 1), Answer::storage_failed);
 }
 
+// The memory says that the seal could not be written although it was: the client is told that the commit failed,
+// so the next start must not bring the set after all.
+TEST(Store, ASealThatFailedIsNotFoundAtTheNextStart) {
+  for (const bool trial : {false, true}) {
+    Flash flash;
+    { ASSERT_EQ(Arm(flash).push(make_image(tx60l(), 1)), Answer::accepted); }
+    Storage storage = flash.hooks();
+    storage.write = [](void* self, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
+                       std::uint32_t size) {
+      const StorageResult r = static_cast<Flash*>(self)->hooks().write(self, slot, offset, from, size);
+      return offset + size == slot_bytes ? StorageResult::failed : r;
+    };
+    Arm arm(flash);
+    arm.device = std::make_unique<Device>(tx60l(), storage, DeviceSettings{});
+    arm.device->store().boot();
+    arm.step();
+    const Answer a =
+        arm.push(make_image(tx60l(), 2), trial ? Command::commit_trial : Command::commit, 100000);
+    if (trial) {
+      EXPECT_EQ(a, Answer::accepted);
+      EXPECT_EQ(arm.run(Command::confirm), Answer::accepted);
+      arm.settle();
+    }
+    EXPECT_EQ(static_cast<Answer>(arm.device->status().answer), Answer::storage_failed);
+    EXPECT_EQ(arm.device->status().faults, wire::fault::storage);
+    EXPECT_EQ(arm.sequence(), 1U);
+    EXPECT_EQ(state(arm), StoreState::idle);
+    EXPECT_EQ(Arm(flash).sequence(), 1U);
+  }
+}
+
 TEST(Store, StartsWithTheOlderSetWhereTheNewestIsDamaged) {
   Flash flash;
   {
@@ -392,6 +423,35 @@ TEST(Store, StartsWithTheOlderSetWhereTheNewestIsDamaged) {
   EXPECT_EQ(none.sequence(), 0U);
   EXPECT_EQ(none.step().status, StepStatus::no_set);
   EXPECT_EQ(none.device->status().faults, wire::fault::no_valid_set);
+}
+
+// Two sets that this start refuses, and a new one with a lower sequence: at a start that would accept them again
+// they must not come back in its place.
+TEST(Store, WhatWasRefusedAtTheStartDoesNotReplaceANewerSet) {
+  for (const bool trial : {false, true}) {
+    Flash flash;
+    {
+      Arm arm(flash);
+      ASSERT_EQ(arm.push(make_image(arm.robot, 5)), Answer::accepted);
+      ASSERT_EQ(arm.push(make_image(arm.robot, 6)), Answer::accepted);
+    }
+    const Bytes image = make_image(tx60l(), 1, 0.01);
+    {
+      DeviceSettings strict;
+      strict.store.plausible_position_m = real(5e-5);
+      Arm arm(flash, strict);
+      ASSERT_EQ(arm.sequence(), 0U);
+      ASSERT_EQ(arm.push(image, trial ? Command::commit_trial : Command::commit, 100000), Answer::accepted);
+      if (trial) {
+        ASSERT_EQ(arm.run(Command::confirm), Answer::accepted);
+        ASSERT_EQ(static_cast<Answer>(arm.settle().answer), Answer::accepted);
+      }
+      EXPECT_EQ(arm.pull(), image);
+    }
+    Arm after(flash);
+    EXPECT_EQ(after.pull(), image);
+    EXPECT_EQ(after.device->status().faults, 0);
+  }
 }
 
 // The power goes at every single byte that a commit, a confirmed trial, a rollback or a restore erases or

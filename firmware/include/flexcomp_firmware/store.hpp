@@ -66,8 +66,9 @@ struct StoreSettings {
   std::uint32_t staging_timeout_ms = 30000;
 };
 
-/// Who speaks: a bus, or one connection of it. What one of them stages no other one may touch.
-using Origin = std::uint8_t;
+/// Who speaks: a bus, or one connection of it. What one of them stages no other one may touch. Wide enough for a
+/// new number with every connection that is ever made.
+using Origin = std::uint32_t;
 constexpr Origin nobody = 0;
 
 class Store {
@@ -131,7 +132,9 @@ class Store {
     erase,          ///< commit: the inactive slot
     write,          ///< commit: the image
     compare,        ///< commit: read back
+    clear_stale,    ///< the same where no set was active: erase the slot that no start could use
     seal,           ///< commit or confirm: the seal
+    drop_incoming,  ///< commit or confirm: erase what may have been sealed although writing the seal failed
     await_confirm,  ///< confirm: until the cycle has ended the trial
     drop_active,    ///< rollback: erase the slot that is left behind
     clear_other,    ///< restore: erase the inactive slot
