@@ -334,6 +334,12 @@ TEST(Image, RecordsAreChecked) {
     m.effect = e;
     EXPECT_EQ(load(one_term(m, robot), robot), Refusal::bad_place);
   }
+  // … also under another name: what follows a clock or a speed would move the arm without a bound per cycle.
+  for (const Basis basis : {Basis::time, Basis::step, Basis::relative_speed}) {
+    Term<double> m = t;
+    m.basis = basis;
+    EXPECT_EQ(load(one_term(m, robot), robot), Refusal::bad_place);
+  }
   Term<double> point = t;
   point.place = arms::on_point(0);
   EXPECT_EQ(load(one_term(point, robot), robot), Refusal::bad_place);
