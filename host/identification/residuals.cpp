@@ -30,12 +30,6 @@ Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& e) {
   return Eigen::Matrix3d::Identity() + 0.5 * s + square * s * s;
 }
 
-struct Evaluated {
-  Pose<double> pose;      // Ftool in Fb
-  Eigen::Vector3d point;  // measured point in Fb
-  RowResidual residual;
-};
-
 RowResidual residual_of(const Estimate& estimate, const Observation& row, const Pose<double>& pose,
                         const Eigen::Vector3d& point) {
   RowResidual r;
