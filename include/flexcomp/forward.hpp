@@ -258,32 +258,23 @@ inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cel
 
 }  // namespace detail
 
-/// What a term is multiplied by at this pose: the basis φ(q, context). ws.frames and ws.load are those of the
-/// unloaded pass where needs_loads(basis, factor) holds.
+namespace detail {
+
+/// basis_value() of the bases that need neither frames nor loads, at the readings q (rad). A curve's factor of torque is
+/// left to the caller.
 template <class S, std::size_t N, class Cap>
-inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
-                     const Workspace<S, N>& ws) {
+inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
+                           const std::array<S, N>& q) {
   const std::size_t j = term.joint;
   switch (term.basis) {
     case Basis::one:
       return S(1);
-    case Basis::load_torque:
-      return detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
-    case Basis::load_torque_cubed: {
-      const S tau = detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
-      return tau * tau * tau;
-    }
-    case Basis::link_weight: {
-      std::size_t far = N - 1;
-      while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
-      return detail::link_weight_lever<S, N>(ws.frames, model.gravity(), j, far);
-    }
     case Basis::reading:
-      return ws.q[j];
+      return q[j];
     case Basis::sine:
-      return sin_cos(term.argument * ws.q[j]).s;
+      return sin_cos(term.argument * q[j]).s;
     case Basis::cosine:
-      return sin_cos(term.argument * ws.q[j]).c;
+      return sin_cos(term.argument * q[j]).c;
     case Basis::direction:
       return -context.direction[j];
     case Basis::relative_speed:
@@ -295,6 +286,56 @@ inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const C
     }
     case Basis::time:
       return context.time_s;
+    case Basis::curve: {
+      const Table& table = model.table(term.table);
+      const S* c = model.values(table);
+      const CurveWeights<S> b = curve_weights(q[j], table.size);
+      const S value =
+          c[b.index[0]] * b.w[0] + c[b.index[1]] * b.w[1] + c[b.index[2]] * b.w[2] + c[b.index[3]] * b.w[3];
+      if (term.factor == Factor::temperature)
+        return value * (context.temperature_c - model.reference_temperature());
+      if (term.factor == Factor::payload) return value * context.payload_kg;
+      return value;
+    }
+    case Basis::step:
+      return context.time_s >= term.argument ? S(1) : S(0);
+    case Basis::grid: {
+      const Table& table = model.table(term.table);
+      const S* nodes = model.values(table);
+      const S row = covariate<S, N>(table.row_covariate, table.row_joint, q, context);
+      const S column = covariate<S, N>(table.column_covariate, table.column_joint, q, context);
+      return bilinear<S>(nodes + table.rows + table.columns, table.columns,
+                         find_cell<S>(nodes, table.rows, row),
+                         find_cell<S>(nodes + table.rows, table.columns, column));
+    }
+    default:
+      return S(0);
+  }
+}
+
+}  // namespace detail
+
+/// What a term is multiplied by at this pose: the basis φ(q, context). ws.frames and ws.load are those of the
+/// unloaded pass where needs_loads(basis, factor) holds.
+template <class S, std::size_t N, class Cap>
+inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
+                     const Workspace<S, N>& ws) {
+  const std::size_t j = term.joint;
+  const auto torque = [&ws, j]() {
+    return detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
+  };
+  switch (term.basis) {
+    case Basis::load_torque:
+      return torque();
+    case Basis::load_torque_cubed: {
+      const S tau = torque();
+      return tau * tau * tau;
+    }
+    case Basis::link_weight: {
+      std::size_t far = N - 1;
+      while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
+      return detail::link_weight_lever<S, N>(ws.frames, model.gravity(), j, far);
+    }
     case Basis::load_moment_x:
       return detail::moment_about<S>(ws.load, ws.frames.axis(j + 1, 0), ws.frames.origin[j + 1]);
     case Basis::load_moment_y:
@@ -303,37 +344,11 @@ inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const C
       return detail::moment_about<S>(ws.load, Vector3<S>::UnitX(), Vector3<S>(S(0), S(0), term.argument));
     case Basis::base_moment_y:
       return detail::moment_about<S>(ws.load, Vector3<S>::UnitY(), Vector3<S>(S(0), S(0), term.argument));
-    case Basis::curve: {
-      const Table& table = model.table(term.table);
-      const S* c = model.values(table);
-      const detail::CurveWeights<S> b = detail::curve_weights(ws.q[j], table.size);
-      const S value =
-          c[b.index[0]] * b.w[0] + c[b.index[1]] * b.w[1] + c[b.index[2]] * b.w[2] + c[b.index[3]] * b.w[3];
-      switch (term.factor) {
-        case Factor::one:
-          return value;
-        case Factor::load_torque:
-          return value * detail::moment_about<S>(ws.load, ws.frames.axis(j, 2), ws.frames.origin[j]);
-        case Factor::temperature:
-          return value * (context.temperature_c - model.reference_temperature());
-        case Factor::payload:
-          return value * context.payload_kg;
-      }
-      return value;
-    }
-    case Basis::step:
-      return context.time_s >= term.argument ? S(1) : S(0);
-    case Basis::grid: {
-      const Table& table = model.table(term.table);
-      const S* nodes = model.values(table);
-      const S row = detail::covariate<S, N>(table.row_covariate, table.row_joint, ws.q, context);
-      const S column = detail::covariate<S, N>(table.column_covariate, table.column_joint, ws.q, context);
-      return detail::bilinear<S>(nodes + table.rows + table.columns, table.columns,
-                                 detail::find_cell<S>(nodes, table.rows, row),
-                                 detail::find_cell<S>(nodes + table.rows, table.columns, column));
+    default: {
+      const S value = detail::plain_basis_value(model, term, context, ws.q);
+      return term.basis == Basis::curve && term.factor == Factor::load_torque ? value * torque() : value;
     }
   }
-  return S(0);
 }
 
 namespace detail {

@@ -1,6 +1,6 @@
 /// \file
 /// Fixed-size vectors, rotations and poses. Nothing here allocates: only 3-vectors, 3x3 matrices and
-/// 6-vectors.
+/// 6-vectors; and triples of scalars for what runs in every control cycle.
 #ifndef FLEXCOMP_LINEAR_HPP
 #define FLEXCOMP_LINEAR_HPP
 
@@ -44,6 +44,53 @@ inline Pose<S> operator*(const Pose<S>& outer, const Pose<S>& inner) {
   r.position = outer.position + outer.rotation.col(0) * inner.position.x() +
                outer.rotation.col(1) * inner.position.y() + outer.rotation.col(2) * inner.position.z();
   return r;
+}
+
+/// Three scalars and nothing else: an expression template would go through memory here.
+template <class S>
+struct Triple {
+  S x, y, z;
+};
+
+template <class S>
+inline Triple<S> operator+(const Triple<S>& a, const Triple<S>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class S>
+inline Triple<S> operator-(const Triple<S>& a, const Triple<S>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class S>
+inline Triple<S> operator*(const Triple<S>& a, const S& k) {
+  return {a.x * k, a.y * k, a.z * k};
+}
+template <class S>
+inline Triple<S> cross(const Triple<S>& a, const Triple<S>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <class S>
+inline S dot(const Triple<S>& a, const Triple<S>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class S>
+inline Triple<S> triple(const Vector3<S>& v) {
+  return {v[0], v[1], v[2]};
+}
+
+/// Rows or columns of a 3x3 matrix, as the name of the variable says.
+template <class S>
+struct ThreeTriples {
+  Triple<S> a, b, c;
+};
+
+/// Columns times a vector.
+template <class S>
+inline Triple<S> combine(const ThreeTriples<S>& columns, const Triple<S>& v) {
+  return columns.a * v.x + columns.b * v.y + columns.c * v.z;
+}
+template <class S>
+inline ThreeTriples<S> columns_of(const Matrix3<S>& m) {
+  return {{m(0, 0), m(1, 0), m(2, 0)}, {m(0, 1), m(1, 1), m(2, 1)}, {m(0, 2), m(1, 2), m(2, 2)}};
 }
 
 }  // namespace flexcomp

@@ -5,6 +5,7 @@
 #define FLEXCOMP_MODEL_HPP
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -208,6 +209,7 @@ class Model {
     }
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
+    sort_effects();
   }
 
   /// All of a term list at once.
@@ -251,7 +253,107 @@ class Model {
   std::size_t table_count() const { return table_count_; }
   const S* values(const Table& table) const { return values_.data() + table.offset; }
 
+  // --- for the control cycle: the effects by what they cost ---------------------------------------------
+
+  const std::array<LinkShape<S>, N>& nominals() const { return nominal_; }
+  const std::array<LinkShape<S>, N>& shapes() const { return shape_; }
+  /// True where every effect turns a joint (slot theta of a link) by the load's torque, the links' own weight, or
+  /// something that needs no frames. Then the arm is a rigid chain behind yielding joints.
+  bool only_joints_yield() const { return only_joints_yield_; }
+  /// True where the pose of a joint depends on where the load and the links are.
+  bool yields_to_loads() const { return yields_to_loads_; }
+  /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
+  S compliance(std::size_t i) const { return compliance_[i]; }
+  std::size_t lever_count() const { return group_end_[lever]; }
+  const Term<S>& lever_term(std::size_t k) const { return effects_[order_[k]]; }  ///< equal levers side by side
+  std::size_t other_loaded_count() const { return group_end_[other_loaded] - group_end_[lever]; }
+  const Term<S>& other_loaded_term(std::size_t k) const { return effects_[order_[group_end_[lever] + k]]; }
+  /// Functions of the reading of the very joint that they turn: curves, harmonics, scale.
+  std::size_t own_count() const { return group_end_[own] - group_end_[other_loaded]; }
+  const Term<S>& own_term(std::size_t k) const { return effects_[order_[group_end_[other_loaded] + k]]; }
+  std::size_t other_count() const { return group_end_[other] - group_end_[own]; }
+  const Term<S>& other_term(std::size_t k) const { return effects_[order_[group_end_[own] + k]]; }
+  S inverse_gravity() const { return inverse_gravity_; }  ///< s^2/m; 0 without gravity
+  bool turns_tool() const { return turns_tool_; }
+  /// Nominal tool rotation times the inverse of the one with constant terms.
+  const Matrix3<S>& tool_turn() const { return tool_turn_; }
+
  private:
+  enum Group : std::uint8_t { lever = 0, other_loaded = 1, own = 2, other = 3, groups = 4, summed = 5, none = 6 };
+  static_assert(Cap::terms <= 255, "effects are counted in bytes");
+
+  /// Where the control cycle finds a term; only_joints_yield_ becomes false for one that it finds nowhere.
+  Group group_of(const Term<S>& t) {
+    if (t.place.body == body::point) return none;  // moves what is measured, not the arm
+    const bool turns_joint = t.place.body >= 1 && t.place.body <= N && t.place.slot == slot::theta;
+    const bool of_itself = t.joint + 1U == t.place.body;
+    switch (turns_joint ? t.basis : Basis::load_moment_x) {
+      case Basis::load_torque:
+        return of_itself ? summed : other_loaded;
+      case Basis::load_torque_cubed:
+        return other_loaded;
+      case Basis::link_weight:
+        return lever;
+      case Basis::curve:
+        if (t.factor == Factor::load_torque) return other_loaded;
+        return of_itself ? own : other;
+      case Basis::reading:
+      case Basis::sine:
+      case Basis::cosine:
+        return of_itself ? own : other;
+      case Basis::load_moment_x:
+      case Basis::load_moment_y:
+      case Basis::base_moment_x:
+      case Basis::base_moment_y:
+        only_joints_yield_ = false;
+        return none;
+      default:
+        return other;
+    }
+  }
+
+  void sort_effects() {
+    only_joints_yield_ = true;
+    for (S& c : compliance_) c = S(0);
+    std::array<Group, Cap::terms> group;
+    bool summed_any = false;
+    for (std::size_t k = 0; k < effect_count_; ++k) {
+      const Term<S>& t = effects_[k];
+      group[k] = group_of(t);
+      if (group[k] != summed) continue;
+      compliance_[t.joint] += t.coefficient;
+      summed_any = true;
+    }
+    std::size_t n = 0;
+    for (std::uint8_t g = 0; g < groups; ++g) {
+      for (std::size_t k = 0; k < effect_count_; ++k) {
+        if (group[k] != g) continue;
+        std::size_t at = n++;
+        // Equal levers side by side, so that each is taken once.
+        if (g == lever) {
+          for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at) order_[at] = order_[at - 1];
+        }
+        order_[at] = static_cast<std::uint8_t>(k);
+      }
+      group_end_[g] = static_cast<std::uint8_t>(n);
+    }
+    yields_to_loads_ = summed_any || group_end_[other_loaded] != 0;
+    const S g2 = dot<S>(gravity_, gravity_);
+    using std::sqrt;
+    inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);
+    turns_tool_ = tool_moves_ || !is_zero(tool_[slot::rx]) || !is_zero(tool_[slot::ry]) || !is_zero(tool_[slot::rz]);
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        tool_turn_(r, c) = nominal_tool_.rotation(r, 0) * tool_pose_.rotation(c, 0) +
+                           nominal_tool_.rotation(r, 1) * tool_pose_.rotation(c, 1) +
+                           nominal_tool_.rotation(r, 2) * tool_pose_.rotation(c, 2);
+      }
+    }
+  }
+  static bool comes_before(const Term<S>& a, const Term<S>& b) {
+    return a.joint != b.joint ? a.joint < b.joint : a.argument < b.argument;
+  }
+
   static bool is_zero(double v) { return bits_of(v) << 1U == 0; }
   static bool is_zero(float v) { return to_binary64_bits(v) << 1U == 0; }
   template <class T>
@@ -279,6 +381,14 @@ class Model {
   bool needs_loads_ = false;
   bool axial_gravity_ = true;
   std::array<std::uint8_t, N> link_moves_{};
+  bool only_joints_yield_ = true;
+  bool yields_to_loads_ = false;
+  bool turns_tool_ = false;
+  std::array<S, N> compliance_{};
+  S inverse_gravity_ = S(0);
+  Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
+  std::array<std::uint8_t, groups> group_end_{};
+  std::array<std::uint8_t, Cap::terms> order_{};
   std::size_t effect_count_ = 0;
   std::size_t table_count_ = 0;
   std::size_t value_count_ = 0;

@@ -1,0 +1,137 @@
+#pragma once
+// An arm with a set in its storage, as the budget programs measure it: the TX60L with the paper's 39 terms and, where
+// asked for, a curve on each of the six joints.
+#include <cstring>
+
+#include "flexcomp.h"
+#include "flexcomp/image.hpp"
+#include "selftest.hpp"
+
+namespace budget {
+
+using Scalar = FLEXCOMP_SCALAR;
+
+constexpr std::size_t paper_terms = 39;  // entries[39] is the curve
+constexpr std::size_t curve_values = 32;
+
+struct Storage {
+  alignas(8) std::uint8_t bytes[FLEXCOMP_SLOT_BYTES];
+};
+
+inline flexcomp_storage_result read(void* user, unsigned slot, std::uint32_t offset, std::uint8_t* to,
+                                    std::uint32_t size) {
+  std::memset(to, 0xFF, size);
+  if (slot == 0) std::memcpy(to, static_cast<Storage*>(user)->bytes + offset, size);
+  return FLEXCOMP_STORAGE_DONE;
+}
+inline flexcomp_storage_result erase(void*, unsigned) { return FLEXCOMP_STORAGE_FAILED; }
+inline flexcomp_storage_result write(void*, unsigned, std::uint32_t, const std::uint8_t*, std::uint32_t) {
+  return FLEXCOMP_STORAGE_FAILED;
+}
+
+/// The paper's terms, then a curve on each of the first `curves` joints.
+inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t size) {
+  static std::array<flexcomp::Term<Scalar>, paper_terms + 6> terms;
+  static std::array<flexcomp::Table, 6> tables;
+  static std::array<Scalar, 6 * curve_values> values;
+  for (std::size_t k = 0; k < paper_terms; ++k) {
+    const selftest::Entry& e = selftest::entries[k];
+    terms[k] = {};
+    terms[k].place = {e.body, e.slot};
+    terms[k].basis = e.basis;
+    terms[k].joint = e.joint;
+    terms[k].argument = flexcomp::from_binary64<Scalar>(e.argument);
+    terms[k].coefficient = flexcomp::from_binary64<Scalar>(e.coefficient);
+    if (e.basis == flexcomp::Basis::load_torque) terms[k].effect = flexcomp::Effect::joint_compliance;
+    if (e.basis == flexcomp::Basis::link_weight) terms[k].effect = flexcomp::Effect::link_gravity;
+  }
+  std::uint32_t state = 2019;
+  for (Scalar& v : values) {
+    state = state * 1664525U + 1013904223U;
+    v = static_cast<Scalar>(static_cast<std::int32_t>(state >> 8U) - (1 << 23)) * Scalar(3e-4F / (1 << 23));
+  }
+  for (std::size_t j = 0; j < curves; ++j) {
+    flexcomp::Term<Scalar>& t = terms[paper_terms + j];
+    t = {};
+    t.place = {static_cast<std::uint8_t>(j + 1), flexcomp::slot::theta};
+    t.basis = flexcomp::Basis::curve;
+    t.joint = static_cast<std::uint8_t>(j);
+    t.effect = flexcomp::Effect::joint_curve;
+    t.table = static_cast<std::uint16_t>(j);
+    tables[j].offset = static_cast<std::uint16_t>(j * curve_values);
+    tables[j].size = curve_values;
+  }
+  const flexcomp::TermList<Scalar> list{terms.data(),  paper_terms + curves, tables.data(),
+                                        curves,        values.data(),        curves * curve_values};
+  const flexcomp::NominalRobot<6> robot = selftest::tx60l();
+  flexcomp::ImageHeader header;
+  header.sequence = 1;
+  header.nominal_hash = flexcomp::nominal_hash(robot);
+  header.name_hash = robot.name_hash;
+  return flexcomp::encode_image(list, header, out, size);
+}
+
+/// Writes the image and its seal (firmware/include/flexcomp_firmware/store.hpp). False where it does not fit.
+inline bool store_image(std::size_t curves, Storage& storage) {
+  const std::size_t size = make_image(curves, storage.bytes, FLEXCOMP_STAGING_BYTES);
+  if (size == 0) return false;
+  std::uint8_t* seal = storage.bytes + FLEXCOMP_SLOT_BYTES - 32;
+  std::memset(seal, 0, 32);
+  std::memcpy(seal, "FLXS", 4);
+  flexcomp::store_u32(seal + 4, static_cast<std::uint32_t>(size));
+  flexcomp::store_u32(seal + 8, 1);
+  flexcomp::store_u32(seal + 12, flexcomp::load_u32(storage.bytes + size - 4));
+  flexcomp::store_u32(seal + 28, flexcomp::crc32(seal, 28));
+  return true;
+}
+
+/// The nominal TX60L for the C interface.
+inline flexcomp_robot c_robot() {
+  const flexcomp::NominalRobot<6> r = selftest::tx60l();
+  flexcomp_robot c;
+  flexcomp_robot_default(&c);
+  c.name = selftest::robot_name;
+  for (std::size_t i = 0; i < 6; ++i) {
+    c.links[i] = {r.links[i].theta_rad, r.links[i].d_m, r.links[i].a_m, r.links[i].alpha_rad, r.links[i].beta_rad};
+    c.min_rad[i] = r.limits[i].min_rad;
+    c.max_rad[i] = r.limits[i].max_rad;
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    c.tool_xyz_m[k] = r.tool_xyz_m[k];
+    c.payload_com_m[k] = r.payload_com_m[k];
+  }
+  c.payload_kg = r.payload_kg;
+  return c;
+}
+
+/// Starts an arm with this many curves; null where its set did not become active.
+inline flexcomp_arm* start(flexcomp_memory& memory, Storage& storage, std::size_t curves,
+                           const flexcomp_settings* settings) {
+  const flexcomp_robot robot = c_robot();
+  const flexcomp_storage hooks = {&storage, read, erase, write};
+  if (!store_image(curves, storage)) return nullptr;
+  flexcomp_arm* arm = flexcomp_init(&memory, sizeof memory, &robot, settings, &hooks);
+  if (arm == nullptr || flexcomp_boot(arm) != 0) return nullptr;
+  return arm;
+}
+
+/// Joint commands that fill the joint ranges evenly and at random, but not beyond the limits.
+class Commands {
+ public:
+  explicit Commands(std::uint32_t seed) : state_(seed) {}
+  void next(Scalar q[6]) {
+    const flexcomp::NominalRobot<6> robot = selftest::tx60l();
+    for (std::size_t i = 0; i < 6; ++i) {
+      state_ = state_ * 1664525U + 1013904223U;
+      const Scalar u = static_cast<Scalar>(state_ >> 8U) * Scalar(1.0F / (1 << 24));
+      const Scalar low = flexcomp::from_binary64<Scalar>(robot.limits[i].min_rad);
+      const Scalar high = flexcomp::from_binary64<Scalar>(robot.limits[i].max_rad);
+      q[i] = low + (high - low) * u;
+    }
+  }
+
+ private:
+  std::uint32_t state_;
+};
+
+}  // namespace budget
