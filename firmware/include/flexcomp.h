@@ -42,7 +42,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
 
 /* One prepared parameter set; there are two. */
 #define FLEXCOMP_SET_BYTES                                                                                  \
-  (288 * sizeof(flexcomp_real) + FLEXCOMP_TERMS * (16 + 2 * sizeof(flexcomp_real)) + FLEXCOMP_TABLES * 12 + \
+  (400 * sizeof(flexcomp_real) + FLEXCOMP_TERMS * (20 + 2 * sizeof(flexcomp_real)) + FLEXCOMP_TABLES * 12 + \
    FLEXCOMP_TABLE_VALUES * sizeof(flexcomp_real))
 /* Staging memory, the two sets, and all the rest of one arm. */
 #define FLEXCOMP_MEMORY_BYTES (2816 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)

@@ -45,21 +45,27 @@ void ControlCycle::track(const Joints& q) {
     tracking_ = true;
     return;
   }
+  if (settings_.direction_band_rad > Scalar(0)) {
+    const Scalar per_rad = band_inverse_;
+    for (std::size_t j = 0; j < joints; ++j) {
+      const Scalar command = q[j];
+      Scalar d = direction_[j] + (command - last_command_[j]) * per_rad;
+      if (d > Scalar(1)) {
+        d = Scalar(1);
+      } else if (d < Scalar(-1)) {
+        d = Scalar(-1);
+      }
+      direction_[j] = d;
+      last_command_[j] = command;
+    }
+    return;
+  }
   for (std::size_t j = 0; j < joints; ++j) {
     const Scalar move = q[j] - last_command_[j];
-    Scalar d = direction_[j];
-    if (settings_.direction_band_rad > Scalar(0)) {
-      d += move * band_inverse_;
-      if (d > Scalar(1)) d = Scalar(1);
-      if (d < Scalar(-1)) d = Scalar(-1);
-    } else if (move > Scalar(0)) {
-      d = Scalar(1);
-    } else if (move < Scalar(0)) {
-      d = Scalar(-1);
-    }
-    direction_[j] = d;
+    if (move > Scalar(0)) direction_[j] = Scalar(1);
+    if (move < Scalar(0)) direction_[j] = Scalar(-1);
+    last_command_[j] = q[j];
   }
-  last_command_ = q;
 }
 
 // What fades or is held must not push a joint beyond a limit that the command itself respects.
@@ -83,14 +89,23 @@ void ControlCycle::publish(StepStatus status) {
                                             std::memory_order_relaxed);
 }
 
+StepResult ControlCycle::corrected(const FirmwareModel& model, const Joints& q_command_rad,
+                                   const FirmwareContext& context) const {
+  if (!model.reads_direction()) return corrected_command(model, q_command_rad, context, settings_.compensation);
+  FirmwareContext tracked = context;
+  tracked.direction = direction_;
+  return corrected_command(model, q_command_rad, tracked, settings_.compensation);
+}
+
 StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context) {
   bool changed = false;
   const std::uint32_t index = sets_.handover.take(changed);
-  StepResult out{q_command_rad, StepStatus::refused};
-
-  bool finite = true;
-  for (const Scalar q : q_command_rad) finite = finite && is_finite(q);
-  if (!finite) {
+  // 0 * q is 0 but for a NaN or an infinity.
+  Scalar zero = Scalar(0);
+  FLEXCOMP_UNROLL
+  for (std::size_t j = 0; j < joints; ++j) zero += Scalar(0) * q_command_rad[j];
+  if (!(zero <= Scalar(0))) {
+    StepResult out{q_command_rad, StepStatus::refused};
     if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
     if (settings_.on_refusal == OnRefusal::hold_last_correction) {
       for (std::size_t j = 0; j < joints; ++j) {
@@ -101,22 +116,13 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
     return out;
   }
   track(q_command_rad);
-
+  StepResult out = index == Handover::none ? StepResult{q_command_rad, StepStatus::no_set}
+                                           : corrected(sets_.models[index], q_command_rad, context);
   Source source = Source::pass;
-  if (index == Handover::none) {
-    out.status = StepStatus::no_set;
-  } else {
-    FirmwareContext tracked = context;
-    tracked.direction = direction_;
-    const Compensated<Scalar, joints> compensated =
-        corrected_command(sets_.models[index], q_command_rad, tracked, settings_.compensation);
-    out.q = compensated.q;
-    out.status = compensated.status;
-    if (out.status != StepStatus::refused) {
-      source = Source::set;
-    } else if (settings_.on_refusal == OnRefusal::hold_last_correction) {
-      source = Source::hold;
-    }
+  if (out.status < StepStatus::no_set) {
+    source = Source::set;
+  } else if (out.status == StepStatus::refused && settings_.on_refusal == OnRefusal::hold_last_correction) {
+    source = Source::hold;
   }
 
   if (source == Source::hold) {
@@ -147,6 +153,7 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
       }
       --fade_left_;
     }
+    FLEXCOMP_UNROLL
     for (std::size_t j = 0; j < joints; ++j) correction_[j] = out.q[j] - q_command_rad[j];
   }
   source_ = source;

@@ -40,7 +40,7 @@ struct CompensationSettings {
 
 template <class S, std::size_t N>
 struct Compensated {
-  std::array<S, N> q{};  ///< corrected joint command, rad
+  std::array<S, N> q;  ///< corrected joint command, rad
   StepStatus status = StepStatus::refused;
 };
 
@@ -64,25 +64,39 @@ struct Symmetric {
 /// square of the smallest singular value, where it was larger; below the square of settings.singular_below damping
 /// sets in.
 template <class S>
-inline Symmetric<S> damped_inverse(Symmetric<S> a, const CompensationSettings<S>& settings, S& regular) {
+inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings, Symmetric<S>& inverse,
+                           S& regular) {
   // 1 / trace(A^-1) = det(A) / trace(adj(A)) needs no division by a vanishing determinant.
+  const S xx = a.yy * a.zz - a.yz * a.yz;
+  const S yy = a.xx * a.zz - a.xz * a.xz;
+  const S zz = a.xx * a.yy - a.xy * a.xy;
+  const S xy = a.xz * a.yz - a.xy * a.zz;
+  const S xz = a.xy * a.yz - a.xz * a.yy;
+  const S yz = a.xy * a.xz - a.xx * a.yz;
+  const S trace = xx + yy + zz;
+  const S determinant = a.xx * xx + a.xy * xy + a.xz * xz;
   const S threshold = settings.singular_below * settings.singular_below;
-  Symmetric<S> b = a.adjugate();
-  const S trace = b.xx + b.yy + b.zz;
-  S determinant = a.xx * b.xx + a.xy * b.xy + a.xz * b.xz;
   const S measure = trace > S(0) && determinant > S(0) ? determinant / trace : S(0);
   if (measure < regular) regular = measure;
-  if (!(measure >= threshold)) {
-    const S lack = S(1) - measure / threshold;
-    const S lambda = settings.damping * settings.damping * lack * lack;
-    a.xx += lambda;
-    a.yy += lambda;
-    a.zz += lambda;
-    b = a.adjugate();
-    determinant = a.xx * b.xx + a.xy * b.xy + a.xz * b.xz;
+  if (measure >= threshold) {
+    const S k = S(1) / determinant;
+    inverse.xx = xx * k;
+    inverse.yy = yy * k;
+    inverse.zz = zz * k;
+    inverse.xy = xy * k;
+    inverse.xz = xz * k;
+    inverse.yz = yz * k;
+    return;
   }
-  const S k = S(1) / determinant;
-  return {b.xx * k, b.yy * k, b.zz * k, b.xy * k, b.xz * k, b.yz * k};
+  const S lack = S(1) - measure / threshold;
+  const S lambda = settings.damping * settings.damping * lack * lack;
+  Symmetric<S> d = a;
+  d.xx += lambda;
+  d.yy += lambda;
+  d.zz += lambda;
+  const Symmetric<S> b = d.adjugate();
+  const S k = S(1) / (d.xx * b.xx + d.xy * b.xy + d.xz * b.xz);
+  inverse = {b.xx * k, b.yy * k, b.zz * k, b.xy * k, b.xz * k, b.yz * k};
 }
 
 /// Largest magnitude in a list; NaNs are skipped.
@@ -99,103 +113,164 @@ inline S greatest_of(const std::array<S, N>& v) {
 template <class S, std::size_t N>
 inline S square_of(const std::array<S, N>& v) {
   S sum = S(0);
-  for (const S x : v) sum += x * x;
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) sum += v[i] * v[i];
   return sum;
 }
 
 /// The factored Jacobian of one pose; every correction of a cycle uses it.
+///
+/// Here and below structures are read and written scalar by scalar: copied as a whole they would go through memory.
 template <class S, std::size_t N>
 class Corrector {
  public:
-  /// Of the chain at the point `tool`, both in F0.
-  void set(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool,
-           const CompensationSettings<S>& settings) {
+  /// Axes and origins of the joints of the pose, in F0: to be filled in before set(), which uses them up.
+  std::array<JointAxis<S>, N>& joints() { return column_; }
+
+  /// Factors the Jacobian at the point `tool`, in F0.
+  void set(const Triple<S>& tool, const CompensationSettings<S>& settings) {
     regular_ = S(1);
-    Symmetric<S> p = {S(0), S(0), S(0), S(0), S(0), S(0)};
-    for (std::size_t i = 0; i < N; ++i) {
-      const Triple<S> l = cross(joint[i].axis, tool - joint[i].origin);
-      linear_[i] = l;
-      p.xx += l.x * l.x;
-      p.yy += l.y * l.y;
-      p.zz += l.z * l.z;
-      p.xy += l.x * l.y;
-      p.xz += l.x * l.z;
-      p.yz += l.y * l.z;
+    Symmetric<S> block;
+    {
+      const S tx = tool.x, ty = tool.y, tz = tool.z;
+      S xx = S(0), yy = S(0), zz = S(0), xy = S(0), xz = S(0), yz = S(0);
+      for (JointAxis<S>& c : column_) {
+        const S rx = tx - c.origin.x, ry = ty - c.origin.y, rz = tz - c.origin.z;
+        const S lx = c.axis.y * rz - c.axis.z * ry;
+        const S ly = c.axis.z * rx - c.axis.x * rz;
+        const S lz = c.axis.x * ry - c.axis.y * rx;
+        c.origin.x = lx;
+        c.origin.y = ly;
+        c.origin.z = lz;
+        xx += lx * lx;
+        yy += ly * ly;
+        zz += lz * lz;
+        xy += lx * ly;
+        xz += lx * lz;
+        yz += ly * lz;
+      }
+      block = {xx, yy, zz, xy, xz, yz};
     }
-    position_ = damped_inverse(p, settings, regular_);
-    // Rows of Q = Jo Jp^T, and O = Jo Jo^T.
-    ThreeTriples<S> q = {{S(0), S(0), S(0)}, {S(0), S(0), S(0)}, {S(0), S(0), S(0)}};
-    for (std::size_t i = 0; i < N; ++i) {
-      const Triple<S> l = linear_[i];
-      const Triple<S> z = joint[i].axis;
-      q.a.x += z.x * l.x;
-      q.a.y += z.x * l.y;
-      q.a.z += z.x * l.z;
-      q.b.x += z.y * l.x;
-      q.b.y += z.y * l.y;
-      q.b.z += z.y * l.z;
-      q.c.x += z.z * l.x;
-      q.c.y += z.z * l.y;
-      q.c.z += z.z * l.z;
+    damped_inverse(block, settings, position_, regular_);
+    // Rows of Q = Jo Jp^T.
+    S q[9];
+    {
+      S a = S(0), b = S(0), c = S(0), d = S(0), e = S(0), f = S(0), g = S(0), h = S(0), k = S(0);
+      for (const JointAxis<S>& j : column_) {
+        const S lx = j.origin.x, ly = j.origin.y, lz = j.origin.z;
+        const S zx = j.axis.x, zy = j.axis.y, zz = j.axis.z;
+        a += zx * lx;
+        b += zx * ly;
+        c += zx * lz;
+        d += zy * lx;
+        e += zy * ly;
+        f += zy * lz;
+        g += zz * lx;
+        h += zz * ly;
+        k += zz * lz;
+      }
+      q[0] = a, q[1] = b, q[2] = c, q[3] = d, q[4] = e, q[5] = f, q[6] = g, q[7] = h, q[8] = k;
     }
-    Symmetric<S> o = {S(0), S(0), S(0), S(0), S(0), S(0)};
-    for (std::size_t i = 0; i < N; ++i) {
-      const Triple<S> z = joint[i].axis;
-      angular_[i] = z;
-      o.xx += z.x * z.x;
-      o.yy += z.y * z.y;
-      o.zz += z.z * z.z;
-      o.xy += z.x * z.y;
-      o.xz += z.x * z.z;
-      o.yz += z.y * z.z;
+    // Jo Jo^T - Q P^-1 Q^T
+    S xx = S(0), yy = S(0), zz = S(0), xy = S(0), xz = S(0), yz = S(0);
+    for (const JointAxis<S>& j : column_) {
+      const S x = j.axis.x, y = j.axis.y, z = j.axis.z;
+      xx += x * x;
+      yy += y * y;
+      zz += z * z;
+      xy += x * y;
+      xz += x * z;
+      yz += y * z;
     }
-    gain_.a = position_ * q.a;
-    gain_.b = position_ * q.b;
-    gain_.c = position_ * q.c;
-    o.xx -= dot(gain_.a, q.a);
-    o.xy -= dot(gain_.a, q.b);
-    o.xz -= dot(gain_.a, q.c);
-    o.yy -= dot(gain_.b, q.b);
-    o.yz -= dot(gain_.b, q.c);
-    o.zz -= dot(gain_.c, q.c);
-    orientation_ = damped_inverse(o, settings, regular_);
+    for (int r = 0; r < 3; ++r) {
+      const S x = q[3 * r], y = q[3 * r + 1], z = q[3 * r + 2];
+      gain_[3 * r] = position_.xx * x + position_.xy * y + position_.xz * z;
+      gain_[3 * r + 1] = position_.xy * x + position_.yy * y + position_.yz * z;
+      gain_[3 * r + 2] = position_.xz * x + position_.yz * y + position_.zz * z;
+    }
+    xx -= gain_[0] * q[0];
+    xx -= gain_[1] * q[1];
+    xx -= gain_[2] * q[2];
+    xy -= gain_[0] * q[3];
+    xy -= gain_[1] * q[4];
+    xy -= gain_[2] * q[5];
+    xz -= gain_[0] * q[6];
+    xz -= gain_[1] * q[7];
+    xz -= gain_[2] * q[8];
+    yy -= gain_[3] * q[3];
+    yy -= gain_[4] * q[4];
+    yy -= gain_[5] * q[5];
+    yz -= gain_[3] * q[6];
+    yz -= gain_[4] * q[7];
+    yz -= gain_[5] * q[8];
+    zz -= gain_[6] * q[6];
+    zz -= gain_[7] * q[7];
+    zz -= gain_[8] * q[8];
+    block = {xx, yy, zz, xy, xz, yz};
+    damped_inverse(block, settings, orientation_, regular_);
     if (!(regular_ >= settings.singular_below * settings.singular_below)) gave_up_ = true;
   }
 
   /// Whether any correction so far was damped or scaled down.
   bool gave_up() const { return gave_up_; }
-  /// True where the joints have turned so far since set() that the factored Jacobian is a tenth off or more.
-  bool is_worn_by(const std::array<S, N>& dq) const { return !(square_of(dq) <= S(0.01) * regular_); }
+  /// True where joints that turned by this sum of squares (rad^2) since set() have made the factored Jacobian a tenth
+  /// wrong or more.
+  bool is_worn_by(S square) const { return !(square <= S(0.01) * regular_); }
 
   /// Joint correction for a position error (m) and a small orientation error (rad), both in F0: what the
   /// position needs, no joint more than `largest`, plus what the orientation still needs while the tool point
-  /// stays, no joint more than `largest_turn` (rad).
-  void solve(const Triple<S>& position, const Triple<S>& orientation, S largest, S largest_turn,
+  /// stays, no joint more than `largest_turn` (rad). Returns the sum of its squares.
+  S solve(const Triple<S>& position, const Triple<S>& orientation, S largest, S largest_turn,
              std::array<S, N>& dq) {
-    Triple<S> u = position_ * position;
-    const Triple<S> rest = orientation - Triple<S>{dot(gain_.a, position), dot(gain_.b, position), dot(gain_.c, position)};
-    const Triple<S> v = orientation_ * rest;
-    const Triple<S> w = combine(gain_, v);  // gain_ has rows: this is its transpose times v
+    const S px = position.x, py = position.y, pz = position.z;
+    S ux = position_.xx * px + position_.xy * py + position_.xz * pz;
+    S uy = position_.xy * px + position_.yy * py + position_.yz * pz;
+    S uz = position_.xz * px + position_.yz * py + position_.zz * pz;
+    const S ex = orientation.x - (gain_[0] * px + gain_[1] * py + gain_[2] * pz);
+    const S ey = orientation.y - (gain_[3] * px + gain_[4] * py + gain_[5] * pz);
+    const S ez = orientation.z - (gain_[6] * px + gain_[7] * py + gain_[8] * pz);
+    const S vx = orientation_.xx * ex + orientation_.xy * ey + orientation_.xz * ez;
+    const S vy = orientation_.xy * ex + orientation_.yy * ey + orientation_.yz * ez;
+    const S vz = orientation_.xz * ex + orientation_.yz * ey + orientation_.zz * ez;
+    const S wx = gain_[0] * vx + gain_[3] * vy + gain_[6] * vz;
+    const S wy = gain_[1] * vx + gain_[4] * vy + gain_[7] * vz;
+    const S wz = gain_[2] * vx + gain_[5] * vy + gain_[8] * vz;
     // |shift|^2 <= u . position and |turn|^2 <= v . rest: nearly always nothing has to be scaled down.
-    if (!(dot(u, position) <= largest * largest && dot(v, rest) <= largest_turn * largest_turn)) {
-      solve_held(u, v, w, largest, largest_turn, dq);
-      return;
+    if (!(ux * px + uy * py + uz * pz <= largest * largest &&
+          vx * ex + vy * ey + vz * ez <= largest_turn * largest_turn)) {
+      return solve_held({ux, uy, uz}, {vx, vy, vz}, {wx, wy, wz}, largest, largest_turn, dq);
     }
-    u = u - w;
-    for (std::size_t i = 0; i < N; ++i) dq[i] = dot(linear_[i], u) + dot(angular_[i], v);
+    ux -= wx;
+    uy -= wy;
+    uz -= wz;
+    S square = S(0);
+    FLEXCOMP_UNROLL
+    for (std::size_t i = 0; i < N; ++i) {
+      const JointAxis<S>& c = column_[i];
+      S turn = c.axis.x * vx;
+      turn += c.axis.y * vy;
+      turn += c.axis.z * vz;
+      turn += c.origin.x * ux;
+      turn += c.origin.y * uy;
+      turn += c.origin.z * uz;
+      dq[i] = turn;
+      square += turn * turn;
+    }
+    return square;
   }
 
  private:
-  void solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest, S largest_turn,
-                  std::array<S, N>& dq) {
+  S solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest, S largest_turn,
+               std::array<S, N>& dq) {
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) {
-      dq[i] = dot(linear_[i], u);
-      turn[i] = dot(angular_[i], v) - dot(linear_[i], w);
+      dq[i] = dot(column_[i].origin, u);
+      turn[i] = dot(column_[i].axis, v) - dot(column_[i].origin, w);
     }
     if (hold_below(dq, largest)) gave_up_ = true;
     if (hold_below(turn, largest_turn)) gave_up_ = true;
     for (std::size_t i = 0; i < N; ++i) dq[i] += turn[i];
+    return square_of(dq);
   }
   static bool hold_below(std::array<S, N>& v, S largest) {
     const S greatest = greatest_of(v);
@@ -205,11 +280,10 @@ class Corrector {
     return true;
   }
 
-  std::array<Triple<S>, N> linear_;
-  std::array<Triple<S>, N> angular_;
+  std::array<JointAxis<S>, N> column_;  ///< axis, and in the place of the origin axis x (tool - origin)
   Symmetric<S> position_;
   Symmetric<S> orientation_;
-  ThreeTriples<S> gain_;  ///< rows of Q P^-1
+  S gain_[9];  ///< rows of Q P^-1
   S regular_ = S(0);
   bool gave_up_ = false;
 };
@@ -217,38 +291,76 @@ class Corrector {
 /// sin(angle) * axis of the rotation that turns `from` into `to` (columns), in the outer frame; exact to third
 /// order.
 template <class S>
-inline Triple<S> rotation_error(const ThreeTriples<S>& to, const ThreeTriples<S>& from) {
-  return {S(0.5) * (from.a.y * to.a.z - from.a.z * to.a.y + from.b.y * to.b.z - from.b.z * to.b.y +
-                    from.c.y * to.c.z - from.c.z * to.c.y),
-          S(0.5) * (from.a.z * to.a.x - from.a.x * to.a.z + from.b.z * to.b.x - from.b.x * to.b.z +
-                    from.c.z * to.c.x - from.c.x * to.c.z),
-          S(0.5) * (from.a.x * to.a.y - from.a.y * to.a.x + from.b.x * to.b.y - from.b.y * to.b.x +
-                    from.c.x * to.c.y - from.c.y * to.c.x)};
+inline void rotation_error(const ThreeTriples<S>& to, const ThreeTriples<S>& from, Triple<S>& error) {
+  S x = from.a.y * to.a.z - from.a.z * to.a.y;
+  S y = from.a.z * to.a.x - from.a.x * to.a.z;
+  S z = from.a.x * to.a.y - from.a.y * to.a.x;
+  x += from.b.y * to.b.z;
+  x -= from.b.z * to.b.y;
+  y += from.b.z * to.b.x;
+  y -= from.b.x * to.b.z;
+  z += from.b.x * to.b.y;
+  z -= from.b.y * to.b.x;
+  x += from.c.y * to.c.z;
+  x -= from.c.z * to.c.y;
+  y += from.c.z * to.c.x;
+  y -= from.c.x * to.c.z;
+  z += from.c.x * to.c.y;
+  z -= from.c.y * to.c.x;
+  error.x = S(0.5) * x;
+  error.y = S(0.5) * y;
+  error.z = S(0.5) * z;
 }
 
-/// How the tool point and the rotation move when the joints turn by dq: the Jacobian of this chain times dq.
+/// A point of the flange frame, in F0.
 template <class S>
-struct Motion {
-  Triple<S> linear;
-  Triple<S> angular;
-};
+inline void flange_point(const FlangePose<S>& flange, const Vector3<S>& at, Triple<S>& point) {
+  const S x = at[0], y = at[1], z = at[2];
+  const ThreeTriples<S>& f = flange.axes;
+  point.x = flange.origin.x + (f.a.x * x + f.b.x * y + f.c.x * z);
+  point.y = flange.origin.y + (f.a.y * x + f.b.y * y + f.c.y * z);
+  point.z = flange.origin.z + (f.a.z * x + f.b.z * y + f.c.z * z);
+}
+
+/// How the tool point (m) and the rotation (rad) move when the joints of this chain turn by dq, to second order.
 template <class S, std::size_t N>
-inline Motion<S> motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool,
-                        const std::array<S, N>& dq) {
-  Triple<S> turn = {S(0), S(0), S(0)};
-  Triple<S> at_zero = {S(0), S(0), S(0)};  // of the point that lies at the origin of F0
-  for (std::size_t i = 0; i < N; ++i) {
-    const Triple<S> w = joint[i].axis * dq[i];
-    const Triple<S>& p = joint[i].origin;
-    turn = turn + w;
-    at_zero.x += p.y * w.z;
-    at_zero.x -= p.z * w.y;
-    at_zero.y += p.z * w.x;
-    at_zero.y -= p.x * w.z;
-    at_zero.z += p.x * w.y;
-    at_zero.z -= p.y * w.x;
+inline void motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool, const std::array<S, N>& dq,
+                   Twist<S>& out) {
+  // From the flange inward: what the outer joints do is turned by the inner ones.
+  S px = tool.x, py = tool.y, pz = tool.z;
+  S wx = S(0), wy = S(0), wz = S(0);
+  for (std::size_t i = N; i-- > 0;) {
+    const JointAxis<S>& j = joint[i];
+    const S k = dq[i];
+    const S ax = j.axis.x * k, ay = j.axis.y * k, az = j.axis.z * k;
+    const S rx = px - j.origin.x, ry = py - j.origin.y, rz = pz - j.origin.z;
+    // p + a x r + a x (a x r) / 2
+    const S cx = ay * rz - az * ry, cy = az * rx - ax * rz, cz = ax * ry - ay * rx;
+    const S hx = S(0.5) * ax, hy = S(0.5) * ay, hz = S(0.5) * az;
+    px += cx;
+    px += hy * cz;
+    px -= hz * cy;
+    py += cy;
+    py += hz * cx;
+    py -= hx * cz;
+    pz += cz;
+    pz += hx * cy;
+    pz -= hy * cx;
+    // w + a + a x w / 2
+    const S ux = wx, uy = wy, uz = wz;
+    wx += ax;
+    wx += hy * uz;
+    wx -= hz * uy;
+    wy += ay;
+    wy += hz * ux;
+    wy -= hx * uz;
+    wz += az;
+    wz += hx * uy;
+    wz -= hy * ux;
   }
-  return {at_zero + cross(turn, tool), turn};
+  const S vx = px - tool.x, vy = py - tool.y, vz = pz - tool.z;
+  out.linear = {vx, vy, vz};
+  out.angular = {wx, wy, wz};
 }
 
 /// What one correction may turn any joint for the orientation, in parts of the largest correction. A regular
@@ -261,9 +373,20 @@ constexpr S allowed_turn(int correction) {
 /// False for a context with a NaN or an infinity in it: 0 * x is 0 for all other numbers.
 template <class S, std::size_t N>
 inline bool is_finite_context(const Context<S, N>& c) {
-  S zero = S(0) * c.payload_kg + S(0) * c.temperature_c + S(0) * c.time_s;
-  for (std::size_t k = 0; k < 3; ++k) zero += S(0) * c.payload_com_m[k] + S(0) * c.force_n[k];
-  for (std::size_t i = 0; i < N; ++i) zero += S(0) * c.direction[i] + S(0) * c.relative_speed[i];
+  const S none = S(0);
+  S zero = none * c.payload_kg;
+  zero += none * c.temperature_c;
+  zero += none * c.time_s;
+  FLEXCOMP_UNROLL
+  for (std::size_t k = 0; k < 3; ++k) {
+    zero += none * c.payload_com_m[k];
+    zero += none * c.force_n[k];
+  }
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) {
+    zero += none * c.direction[i];
+    zero += none * c.relative_speed[i];
+  }
   return zero <= S(0);
 }
 
@@ -275,25 +398,54 @@ struct Aim {
   Triple<S> tool_point;
 };
 
-template <class S, std::size_t N, class Cap>
-inline Aim<S> aim_of(const Model<S, N, Cap>& model, const RigidChain<S, N>& nominal, const Triple<S>& tool_point) {
-  Aim<S> aim = {nominal.flange, tool_point};
-  if (model.turns_tool()) {
-    const ThreeTriples<S> turn = columns_of(model.tool_turn());
-    aim.flange = {combine(nominal.flange, turn.a), combine(nominal.flange, turn.b), combine(nominal.flange, turn.c)};
-  }
-  if (model.has_base()) {
-    const ThreeTriples<S> b = columns_of(model.base_pose().rotation);
-    const auto back = [&b](const Triple<S>& v) { return Triple<S>{dot(b.a, v), dot(b.b, v), dot(b.c, v)}; };
-    aim.flange = {back(aim.flange.a), back(aim.flange.b), back(aim.flange.c)};
-    aim.tool_point = back(aim.tool_point - triple<S>(model.base_pose().position));
-  }
-  return aim;
+/// The transpose of a rotation times v.
+template <class S>
+inline void turn_back(const Matrix3<S>& b, Triple<S>& v) {
+  const S x = v.x, y = v.y, z = v.z;
+  v.x = b(0, 0) * x + b(1, 0) * y + b(2, 0) * z;
+  v.y = b(0, 1) * x + b(1, 1) * y + b(2, 1) * z;
+  v.z = b(0, 2) * x + b(1, 2) * y + b(2, 2) * z;
 }
 
+template <class S, std::size_t N, class Cap>
+inline void take_aim(const Model<S, N, Cap>& model, const FlangePose<S>& nominal, const Triple<S>& tool_point,
+                     Aim<S>& aim) {
+  aim.flange = nominal.axes;
+  aim.tool_point = tool_point;
+  if (model.turns_tool()) {
+    const ThreeTriples<S> turn = columns_of(model.tool_turn());
+    aim.flange = {combine(nominal.axes, turn.a), combine(nominal.axes, turn.b), combine(nominal.axes, turn.c)};
+  }
+  if (model.has_base()) {
+    const Vector3<S>& p = model.base_pose().position;
+    const Matrix3<S>& b = model.base_pose().rotation;
+    aim.tool_point.x -= p[0];
+    aim.tool_point.y -= p[1];
+    aim.tool_point.z -= p[2];
+    turn_back(b, aim.flange.a);
+    turn_back(b, aim.flange.b);
+    turn_back(b, aim.flange.c);
+    turn_back(b, aim.tool_point);
+  }
+}
+
+/// Turns all angles; `square` is the sum of the squares. Without the last terms of rotate(): up to 1/64 rad they leave
+/// 1e-11.
 template <class S, std::size_t N>
-inline void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
-  for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
+inline void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
+  if (!(square < S(0.000244140625))) {
+    for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
+    return;
+  }
+  for (std::size_t i = 0; i < N; ++i) {
+    const S d = by[i];
+    const S z = d * d;
+    const S sine = d - d * (z * S(1.0 / 6));
+    const S versine = z * (S(0.5) - z * S(1.0 / 24));
+    const S s = angle[i].s, c = angle[i].c;
+    angle[i].s = s + (c * sine - s * versine);
+    angle[i].c = c - (s * sine + c * versine);
+  }
 }
 
 /// What turns joints without frames and not by their own reading alone.
@@ -306,122 +458,191 @@ inline void add_other_yield(const Model<S, N, Cap>& model, const std::array<S, N
   }
 }
 
-/// Corrections of the rigid chain at most; the third only where the second was still large.
+/// Takes the terms of Model::own_term() off the readings q: x + own(x) = q by Newton's method, with the curvature.
+template <class S, std::size_t N, class Cap>
+inline void take_own_yield(const Model<S, N, Cap>& model, const Context<S, N>& context, std::array<S, N>& q,
+                           std::array<S, N>& dq, std::array<S, N>& share) {
+  std::array<Local<S>, N> own;
+  for (Local<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
+  for (std::size_t k = 0; k < model.own_count(); ++k) {
+    const Term<S>& term = model.own_term(k);
+    add_own_yield(model, term, q[term.joint], context, own[term.joint]);
+  }
+  for (std::size_t i = 0; i < N; ++i) {
+    const S w = S(1) / (S(1) + own[i].slope);
+    const S newton = own[i].value * w;
+    const S step = newton + own[i].half_curvature * newton * newton * w;
+    share[i] = w;
+    q[i] -= step;
+    dq[i] -= step;
+  }
+}
+
+/// Corrections of the rigid chain at most: one from the nominal pose and two from the chain's own.
 constexpr int most_corrections = 3;
-/// A correction whose square sum is below this (rad^2) leaves less than 1e-9 rad by what a Newton step leaves, half
-/// its own square.
-template <class S>
-constexpr S small_correction = S(6e-10);
-/// Evaluations of the yield after the first at most. Each gains a factor of its slope, some 1e-3 on a stiff arm.
+/// Solutions of one linear problem after the first at most. Each leaves what the factored Jacobian is off by, some
+/// 1e-2, of the one before.
+constexpr int most_refinements = 3;
+/// Evaluations of the yield after the first at most. Each leaves its slope, some 1e-3 on a stiff arm, of the one before.
 constexpr int most_yield_steps = 6;
+
+/// When a double or a float is accurate enough; squares of rad.
 template <class S>
-constexpr S small_yield_step = S(1e-14);  ///< rad^2
+struct Enough {
+  static constexpr S correction = S(1e-8);        ///< the next one is a third-order rest of it
+  static constexpr S refinement = S(1e-19);       ///< square of what the next refinement would be
+  static constexpr S yield_step = S(1e-14);       ///< the next one is smaller by the slope
+};
+template <>
+struct Enough<float> {
+  static constexpr float correction = 1e-6F;
+  static constexpr float refinement = 1e-14F;
+  static constexpr float yield_step = 1e-8F;
+};
 
 /// For sets whose effects all turn joints. The arm is then a rigid chain, whose joints stand at psi = q + yield(q):
-/// psi is solved for first, without loads, and then q from it. Leaves q, and whether the work was bounded by giving
-/// something up in the corrector.
+/// psi is solved for first, without loads, and then q from it. `angle` comes with the nominal offsets.
 template <class S, std::size_t N, class Cap>
 inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>& aim, const Context<S, N>& context,
                                     std::array<SinCos<S>, N>& angle, Corrector<S, N>& corrector,
-                                    const CompensationSettings<S>& settings,
-                                    RigidChain<S, N>& chain, std::array<S, N>& q) {
-  for (std::size_t i = 0; i < N; ++i) angle[i] = compose(angle[i], model.shape(i).offset);
-  const bool loaded = model.yields_to_loads() || model.lever_count() != 0;
-  const CarriedLoad<S> load = carried_load(model, context);
-  std::array<S, N> yield{};
-  // Taken at the command, some milliradians off: its own error is that times its slope, 1e-5 rad.
-  if (loaded) loaded_yield(model, q, angle, load, yield);
-
-  const Triple<S> tool = triple<S>(model.tool_pose().position);
+                                    const CompensationSettings<S>& settings, const Triple<S>& nominal_tool,
+                                    std::array<S, N>& q) {
   const S largest = settings.largest_correction_rad;
   std::array<S, N> dq;
-  bool fresh = false;
-  for (int k = 0; k < most_corrections; ++k) {
-    rigid_pass(model.shapes(), angle, chain);
-    const Triple<S> point = chain.end + combine(chain.flange, tool);
-    Triple<S> position = aim.tool_point - point;
-    Triple<S> orientation = rotation_error(aim.flange, chain.flange);
-    const S turn = largest * allowed_turn<S>(k);
-    // Beside a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some
-    // percent: from there on it is the one close to the solution.
-    if (k == 1 && (corrector.gave_up() || corrector.is_worn_by(dq))) {
-      corrector.set(chain.joint, point, settings);
-      fresh = true;
-    }
-    corrector.solve(position, orientation, largest, turn, dq);
-    bool done = k > 0;
-    if (k > 0 && !fresh) {
-      // The factored Jacobian is the nominal arm's at the command, off by some 1e-3: what it leaves of the linear
-      // problem here is solved for once more.
-      const Motion<S> reached = motion(chain.joint, point, dq);
-      std::array<S, N> rest;
-      corrector.solve(position - reached.linear, orientation - reached.angular, largest, turn, rest);
-      // Each of these solutions leaves the same part of the one before.
-      const S square = square_of(rest);
-      done = square * square <= S(1e-19) * square_of(dq);
-      for (std::size_t i = 0; i < N; ++i) dq[i] += rest[i];
-    }
-    for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
-    rotate_all(angle, dq);
-    // Where something is given up the last correction decides how much, so there it is never left out.
-    if (done && !corrector.gave_up() && square_of(dq) <= small_correction<S>) break;
+  Twist<S> move;
+  // First what the constant terms do to the nominal chain, to first order.
+  constant_twist(model, angle, move);
+  {
+    const Twist<S>& base = model.base_twist();
+    const Triple<S> turn = {-move.angular.x - base.angular.x, -move.angular.y - base.angular.y,
+                            -move.angular.z - base.angular.z};
+    const S tx = nominal_tool.x, ty = nominal_tool.y, tz = nominal_tool.z;
+    const Triple<S> shift = {turn.y * tz - turn.z * ty - move.linear.x - base.linear.x,
+                             turn.z * tx - turn.x * tz - move.linear.y - base.linear.y,
+                             turn.x * ty - turn.y * tx - move.linear.z - base.linear.z};
+    corrector.solve(shift, turn, largest, largest, dq);
+  }
+  std::array<S, N> by;
+  S turned = S(0);
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) {
+    const S d = dq[i];
+    q[i] += d;
+    const S b = d + model.constant_theta(i);
+    by[i] = b;
+    turned += b * b;
+  }
+  rotate_all(angle, by, turned);
+
+  // The yield is taken here already, some milliradians beside the reading: off by that times its slope.
+  const bool loaded = model.yields_to_loads() || model.lever_count() != 0;
+  const bool direct = model.own_count() + model.other_count() != 0;
+  CarriedLoad<S> load;
+  std::array<S, N> yield;
+  if (loaded) {
+    carried_load(model, context, load);
+    loaded_yield(model, q, angle, load, yield);
+  } else {
+    for (S& y : yield) y = S(0);
   }
 
-  // q was psi until here. Now it becomes the reading x with x + own(x) + yield(x) = psi.
-  const bool direct = model.own_count() + model.other_count() != 0;
+  std::array<JointAxis<S>, N> joints;
+  FlangePose<S> flange;
+  bool fresh = false;
+  for (int k = 1;; ++k) {
+    rigid_pass(model.shapes(), angle, joints, flange);
+    Triple<S> point;
+    flange_point(flange, model.tool_pose().position, point);
+    const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y, aim.tool_point.z - point.z};
+    Triple<S> turn;
+    rotation_error(aim.flange, flange.axes, turn);
+    const S largest_turn = largest * allowed_turn<S>(k);
+    // Beside a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some
+    // percent: from there on it is the one close to the solution.
+    if (k == 1 && (corrector.gave_up() || corrector.is_worn_by(turned))) {
+      corrector.joints() = joints;
+      corrector.set(point, settings);
+      fresh = true;
+    }
+    S square = corrector.solve(shift, turn, largest, largest_turn, dq);
+    bool done = true;
+    for (int n = 0; n < most_refinements && !fresh; ++n) {
+      // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
+      // order of the motion with it.
+      motion(joints, point, dq, move);
+      const Triple<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y, shift.z - move.linear.z};
+      const Triple<S> turn_left = {turn.x - move.angular.x, turn.y - move.angular.y, turn.z - move.angular.z};
+      std::array<S, N> rest;
+      const S left = corrector.solve(shift_left, turn_left, largest, largest_turn, rest);
+      // Each of them leaves the same part of the one before.
+      done = left * left <= Enough<S>::refinement * square;
+      square = S(0);
+      FLEXCOMP_UNROLL
+      for (std::size_t i = 0; i < N; ++i) {
+        const S d = dq[i] + rest[i];
+        dq[i] = d;
+        square += d * d;
+      }
+      if (done) break;
+    }
+    FLEXCOMP_UNROLL
+    for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
+    if (k == most_corrections - 1) break;
+    // Where something is given up the last correction decides how much, so there it is never left out.
+    if (done && !corrector.gave_up() && square <= (fresh ? S(0.1) : S(1)) * Enough<S>::correction) break;
+    rotate_all(angle, dq, square);
+  }
   if (!loaded && !direct) return;
+
+  // q was psi until here. Now it becomes the reading x with x + own(x) + yield(x) = psi; the angles lag by dq.
   if (direct) add_other_yield(model, q, context, yield);
   std::array<S, N> share;  // of a change of the yield that the reading takes
+  FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) {
+    const S y = yield[i];
+    q[i] -= y;
+    dq[i] -= y;
     share[i] = S(1);
-    dq[i] = -yield[i];
   }
-  if (model.own_count() != 0) {
-    std::array<S, N> at;
-    std::array<Local<S>, N> own{};
-    for (std::size_t i = 0; i < N; ++i) at[i] = q[i] - yield[i];
-    for (std::size_t k = 0; k < model.own_count(); ++k) {
-      const Term<S>& term = model.own_term(k);
-      const Local<S> here = own_yield(model, term, at[term.joint], context);
-      Local<S>& sum = own[term.joint];
-      sum.value += here.value;
-      sum.slope += here.slope;
-      sum.half_curvature += here.half_curvature;
-    }
-    for (std::size_t i = 0; i < N; ++i) {
-      share[i] = S(1) / (S(1) + own[i].slope);
-      const S newton = own[i].value * share[i];
-      dq[i] -= newton + own[i].half_curvature * newton * newton * share[i];
-    }
-  }
-  for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
+  if (model.own_count() != 0) take_own_yield(model, context, q, dq, share);
+  S square = square_of(dq);
   for (int k = 0; k < most_yield_steps; ++k) {
-    rotate_all(angle, dq);
-    std::array<S, N> now{};
-    if (loaded) loaded_yield(model, q, angle, load, now);
-    if (direct) add_other_yield(model, q, context, now);
-    for (std::size_t i = 0; i < N; ++i) {
-      dq[i] = (yield[i] - now[i]) * share[i];
-      q[i] += dq[i];
+    std::array<S, N> now;
+    if (loaded) {
+      rotate_all(angle, dq, square);
+      loaded_yield(model, q, angle, load, now);
+    } else {
+      for (S& y : now) y = S(0);
     }
-    yield = now;
-    if (k > 0 && square_of(dq) < small_yield_step<S>) break;
+    if (direct) add_other_yield(model, q, context, now);
+    square = S(0);
+    FLEXCOMP_UNROLL
+    for (std::size_t i = 0; i < N; ++i) {
+      const S y = now[i];
+      const S step = (yield[i] - y) * share[i];
+      yield[i] = y;
+      dq[i] = step;
+      q[i] += step;
+      square += step * step;
+    }
+    if (square <= Enough<S>::yield_step) break;
   }
 }
 
 /// For all other sets: the forward model with its two passes, three times; Newton, Newton, chord.
 template <class S, std::size_t N, class Cap>
 inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, const Context<S, N>& context,
-                        const std::array<SinCos<S>, N>& reading, const CompensationSettings<S>& settings,
-                        Corrector<S, N>& corrector, std::array<S, N>& q) {
+                        const CompensationSettings<S>& settings, Corrector<S, N>& corrector,
+                        std::array<S, N>& q) {
   Workspace<S, N> ws;
   ws.q = q;
-  ws.reading = reading;
+  for (std::size_t i = 0; i < N; ++i) ws.reading[i] = sin_cos(q[i]);
   const S largest = settings.largest_correction_rad;
   for (int k = 0; k < most_corrections; ++k) {
     const Pose<S> pose = evaluate(model, context, ws);
     Triple<S> position = triple<S>(target.position) - triple<S>(pose.position);
-    Triple<S> orientation = rotation_error(columns_of(target.rotation), columns_of(pose.rotation));
+    Triple<S> orientation;
+    rotation_error(columns_of(target.rotation), columns_of(pose.rotation), orientation);
     if (model.has_base()) {
       const ThreeTriples<S> b = columns_of(model.base_pose().rotation);
       position = {dot(b.a, position), dot(b.b, position), dot(b.c, position)};
@@ -430,16 +651,17 @@ inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, co
     if (k == 1) {
       // The first correction can turn the wrist by 20 mrad near a singularity, which changes the Jacobian by
       // some percent: from here on the chord is the deflected chain's own, close to the solution.
-      std::array<JointAxis<S>, N> joint;
       for (std::size_t i = 0; i < N; ++i)
-        joint[i] = {triple<S>(ws.frames.axis(i, 2)), triple<S>(ws.frames.origin[i])};
+        corrector.joints()[i] = {triple<S>(ws.frames.axis(i, 2)), triple<S>(ws.frames.origin[i])};
       const Triple<S> tool = triple<S>(model.tool_pose().position);
-      corrector.set(joint, triple<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool), settings);
+      corrector.set(triple<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool), settings);
     }
     std::array<S, N> dq;
     corrector.solve(position, orientation, largest, largest * allowed_turn<S>(k), dq);
-    for (std::size_t i = 0; i < N; ++i) ws.q[i] += dq[i];
-    rotate_all(ws.reading, dq);
+    for (std::size_t i = 0; i < N; ++i) {
+      ws.q[i] += dq[i];
+      ws.reading[i] = rotate(ws.reading[i], dq[i]);
+    }
   }
   q = ws.q;
 }
@@ -457,40 +679,50 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
                                     const Context<S, N>& context,
                                     const CompensationSettings<S>& settings = {}) {
   Compensated<S, N> out;
-  out.q = q_command;
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) out.q[i] = q_command[i];
   for (std::size_t i = 0; i < N; ++i) {
     if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return out;
   }
   // Asked here because a table holds its end values outside its nodes and would hide a NaN.
   if (!detail::is_finite_context(context)) return out;
   const S largest = settings.largest_correction_rad;
-  std::array<SinCos<S>, N> reading;
   std::array<SinCos<S>, N> angle;
   for (std::size_t i = 0; i < N; ++i) {
-    reading[i] = sin_cos(q_command[i]);
-    angle[i] = compose(reading[i], model.nominal(i).offset);
+    const SinCos<S> reading = sin_cos(q_command[i]);
+    angle[i] = compose(reading, model.nominal(i).offset);
   }
-  detail::RigidChain<S, N> chain;
-  detail::rigid_pass(model.nominals(), angle, chain);
-  const Triple<S> tool_point =
-      chain.end + combine(chain.flange, triple<S>(model.nominal_tool().position));
   detail::Corrector<S, N> corrector;
-  corrector.set(chain.joint, tool_point, settings);
-  std::array<S, N> q = q_command;
+  Triple<S> tool_point;
+  detail::Aim<S> aim;
+  {
+    detail::FlangePose<S> flange;
+    detail::rigid_pass(model.nominals(), angle, corrector.joints(), flange);
+    detail::flange_point(flange, model.nominal_tool().position, tool_point);
+    detail::take_aim(model, flange, tool_point, aim);
+  }
+  corrector.set(tool_point, settings);
+  std::array<S, N> q;
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
   if (model.only_joints_yield()) {
-    const detail::Aim<S> aim = detail::aim_of(model, chain, tool_point);
-    detail::correct_yielding_joints(model, aim, context, reading, corrector, settings, chain, q);
+    detail::correct_yielding_joints(model, aim, context, angle, corrector, settings, tool_point, q);
   } else {
     const Pose<S> target = nominal_forward(model, q_command);
-    detail::correct_any(model, target, context, reading, settings, corrector, q);
+    detail::correct_any(model, target, context, settings, corrector, q);
   }
-  std::array<S, N> change;
-  for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
   // Effects beyond all bounds end here, as a NaN, an infinity or a turn that no arm makes.
-  const S square = detail::square_of(change);
+  S square = S(0);
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) {
+    const S change = q[i] - q_command[i];
+    square += change * change;
+  }
   if (!(square < S(1e8))) return out;
   out.status = corrector.gave_up() ? StepStatus::near_singular : StepStatus::ok;
   if (square > largest * largest) {
+    std::array<S, N> change;
+    for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
     const S greatest = detail::greatest_of(change);
     if (greatest > largest) {
       out.status = StepStatus::limited;
@@ -499,15 +731,16 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
     }
   }
   for (std::size_t i = 0; i < N; ++i) {
-    if (q[i] < model.lower(i)) {
-      q[i] = model.lower(i);
+    S x = q[i];
+    if (x < model.lower(i)) {
+      x = model.lower(i);
       out.status = StepStatus::at_limit;
-    } else if (q[i] > model.upper(i)) {
-      q[i] = model.upper(i);
+    } else if (x > model.upper(i)) {
+      x = model.upper(i);
       out.status = StepStatus::at_limit;
     }
+    out.q[i] = x;
   }
-  out.q = q;
   return out;
 }
 
@@ -525,8 +758,8 @@ inline TargetResidual<S> target_residual(const Model<S, N, Cap>& model, const st
   Workspace<S, N> ws;
   const Pose<S> pose = forward(model, q, context, ws);
   const Vector3<S> p = target.position - pose.position;
-  const Triple<S> r =
-      detail::rotation_error(columns_of(target.rotation), columns_of(pose.rotation));
+  Triple<S> r;
+  detail::rotation_error(columns_of(target.rotation), columns_of(pose.rotation), r);
   using std::sqrt;
   return {sqrt(dot<S>(p, p)), sqrt(dot(r, r))};
 }

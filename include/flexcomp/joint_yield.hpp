@@ -24,38 +24,25 @@ namespace detail {
 template <class S>
 struct CarriedLoad {
   S mass_kg;
+  Triple<S> gravity;       ///< m/s^2, in F0
   Triple<S> com_m;         ///< in the flange frame
   Triple<S> force_n;       ///< external, at the tool point, in F0
   bool has_force = false;  ///< external
 };
 
 template <class S, std::size_t N, class Cap>
-inline CarriedLoad<S> carried_load(const Model<S, N, Cap>& model, const Context<S, N>& context) {
+inline void carried_load(const Model<S, N, Cap>& model, const Context<S, N>& context, CarriedLoad<S>& load) {
   const std::array<S, 4>& edit = model.load_edit();
-  CarriedLoad<S> load;
   load.mass_kg = context.payload_kg + edit[slot::mass];
+  load.gravity = triple<S>(model.gravity());
   load.com_m = {context.payload_com_m[0] + edit[slot::com_x], context.payload_com_m[1] + edit[slot::com_y],
                 context.payload_com_m[2] + edit[slot::com_z]};
   load.force_n = {context.force_n[0], context.force_n[1], context.force_n[2]};
   load.has_force = load.force_n.x < S(0) || load.force_n.x > S(0) || load.force_n.y < S(0) ||
                    load.force_n.y > S(0) || load.force_n.z < S(0) || load.force_n.z > S(0);
-  return load;
 }
 
-/// From the frame before a link's joint into the one between its Rot(z) and its Trans.
-template <class S>
-inline Triple<S> into_middle(const SinCos<S>& theta, const Triple<S>& v) {
-  return {theta.c * v.x + theta.s * v.y, theta.c * v.y - theta.s * v.x, v.z};
-}
-/// From there into the frame after the link, directions only.
-template <class S>
-inline Triple<S> into_end(const LinkShape<S>& link, const Triple<S>& v) {
-  const S y = link.alpha.c * v.y + link.alpha.s * v.z;
-  const S z = link.alpha.c * v.z - link.alpha.s * v.y;
-  if (!link.has_beta) return {v.x, y, z};
-  return {link.beta.c * v.x - link.beta.s * z, y, link.beta.c * z + link.beta.s * v.x};
-}
-/// The ways back.
+/// A direction from the frame after a link into the one between its Rot(z) and its Trans.
 template <class S>
 inline Triple<S> out_of_end(const LinkShape<S>& link, const Triple<S>& v) {
   S x = v.x, z = v.z;
@@ -65,62 +52,65 @@ inline Triple<S> out_of_end(const LinkShape<S>& link, const Triple<S>& v) {
   }
   return {x, link.alpha.c * v.y - link.alpha.s * z, link.alpha.s * v.y + link.alpha.c * z};
 }
+/// From there into the frame before the link's joint.
 template <class S>
 inline Triple<S> out_of_middle(const SinCos<S>& theta, const Triple<S>& v) {
   return {theta.c * v.x - theta.s * v.y, theta.s * v.x + theta.c * v.y, v.z};
 }
 
-/// Gravity in each link's middle frame and the load's torque about each joint.
+/// A constant force field in each link's middle frame, and the torque about each joint of a unit force of it.
 template <class S, std::size_t N>
 struct LinkLoads {
-  std::array<Triple<S>, N> gravity;  ///< m/s^2
-  std::array<S, N> torque;           ///< N·m
+  std::array<Triple<S>, N> field;
+  std::array<S, N> torque;
 };
 
-template <class S, std::size_t N, class Cap>
-inline void carry_load(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
-                       const CarriedLoad<S>& load, LinkLoads<S, N>& out) {
-  const std::array<LinkShape<S>, N>& links = model.shapes();
-  Triple<S> g = triple<S>(model.gravity());
+/// Carries a field given in F0 outward, and the moment that it has on `arm` (in the flange frame, m) inward.
+template <class S, std::size_t N>
+inline void carry(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
+                  const Triple<S>& field, const Triple<S>& arm, LinkLoads<S, N>& out) {
+  S x = field.x, y = field.y, z = field.z;
   for (std::size_t i = 0; i < N; ++i) {
-    g = into_middle(angle[i], g);
-    out.gravity[i] = g;
-    g = into_end(links[i], g);
-  }
-  const S mass = load.mass_kg;
-  Triple<S> moment = cross(load.com_m, g * mass);
-  if (!load.has_force) {
-    for (std::size_t i = N; i-- > 0;) {
-      const LinkShape<S>& link = links[i];
-      const Triple<S>& at = out.gravity[i];
-      const S da = link.d * mass, aa = link.a * mass;
-      moment = out_of_end(link, moment);
-      moment.x -= da * at.y;
-      moment.y += da * at.x;
-      moment.y -= aa * at.z;
-      moment.z += aa * at.y;
-      out.torque[i] = moment.z;
-      moment = out_of_middle(angle[i], moment);
+    const LinkShape<S>& link = links[i];
+    const S c = angle[i].c, s = angle[i].s;
+    const S mx = c * x + s * y;
+    const S my = c * y - s * x;
+    out.field[i].x = mx;
+    out.field[i].y = my;
+    out.field[i].z = z;
+    const S ca = link.alpha.c, sa = link.alpha.s;
+    x = mx;
+    y = ca * my + sa * z;
+    z = ca * z - sa * my;
+    if (link.has_beta) {
+      const S t = x;
+      x = link.beta.c * x - link.beta.s * z;
+      z = link.beta.c * z + link.beta.s * t;
     }
-    return;
   }
-  std::array<Triple<S>, N> force;
-  Triple<S> f = load.force_n;
-  for (std::size_t i = 0; i < N; ++i) {
-    f = into_middle(angle[i], f);
-    force[i] = f + out.gravity[i] * mass;
-    f = into_end(links[i], f);
-  }
-  moment = moment + cross(triple<S>(model.tool_pose().position), f);
+  S nx = arm.y * z - arm.z * y;
+  S ny = arm.z * x - arm.x * z;
+  S nz = arm.x * y - arm.y * x;
   for (std::size_t i = N; i-- > 0;) {
     const LinkShape<S>& link = links[i];
-    const Triple<S>& at = force[i];
-    moment = out_of_end(link, moment);
-    moment.x -= link.d * at.y;
-    moment.y += link.d * at.x - link.a * at.z;
-    moment.z += link.a * at.y;
-    out.torque[i] = moment.z;
-    moment = out_of_middle(angle[i], moment);
+    if (link.has_beta) {
+      const S t = nx;
+      nx = link.beta.c * nx + link.beta.s * nz;
+      nz = link.beta.c * nz - link.beta.s * t;
+    }
+    const S ca = link.alpha.c, sa = link.alpha.s;
+    S my = ca * ny - sa * nz;
+    nz = sa * ny + ca * nz;
+    const S fx = out.field[i].x, fy = out.field[i].y, fz = out.field[i].z;
+    const S d = link.d, a = link.a;
+    nx -= d * fy;
+    my += d * fx;
+    my -= a * fz;
+    nz += a * fy;
+    out.torque[i] = nz;
+    const S c = angle[i].c, s = angle[i].s;
+    ny = s * nx + c * my;
+    nx = c * nx - s * my;
   }
 }
 
@@ -142,11 +132,22 @@ inline S carried_lever(const Model<S, N, Cap>& model, const std::array<SinCos<S>
     x += arm.x;
     y = arm.y;
   }
-  const Triple<S>& g = loads.gravity[joint];
+  const Triple<S>& g = loads.field[joint];
   const S square = x * x + y * y;
   if (!(square > S(1e-6))) return S(0);
   using std::sqrt;
   return (x * g.y - y * g.x) * model.inverse_gravity() / sqrt(square);
+}
+
+template <class S, std::size_t N, class Cap>
+inline void add_force_torques(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
+                              const CarriedLoad<S>& load, std::array<S, N>& torque, std::array<S, N>& delta) {
+  LinkLoads<S, N> of_force;
+  carry(model.shapes(), angle, load.force_n, triple<S>(model.tool_pose().position), of_force);
+  for (std::size_t i = 0; i < N; ++i) {
+    torque[i] += of_force.torque[i];
+    delta[i] += model.compliance(i) * of_force.torque[i];
+  }
 }
 
 /// A function of a joint's reading around one reading: value, slope per rad and half the curvature.
@@ -199,8 +200,15 @@ inline void loaded_yield(const Model<S, N, Cap>& model, const std::array<S, N>& 
                          const std::array<SinCos<S>, N>& angle, const CarriedLoad<S>& load,
                          std::array<S, N>& delta) {
   LinkLoads<S, N> loads;
-  carry_load(model, angle, load, loads);
-  for (std::size_t i = 0; i < N; ++i) delta[i] = model.compliance(i) * loads.torque[i];
+  carry(model.shapes(), angle, load.gravity, load.com_m, loads);
+  const S mass = load.mass_kg;
+  FLEXCOMP_UNROLL
+  for (std::size_t i = 0; i < N; ++i) {
+    const S torque = loads.torque[i] * mass;
+    loads.torque[i] = torque;
+    delta[i] = model.compliance(i) * torque;
+  }
+  if (load.has_force) add_force_torques(model, angle, load, loads.torque, delta);
   std::size_t joint = N, far = N;
   S lever = S(0);
   for (std::size_t k = 0; k < model.lever_count(); ++k) {
@@ -227,23 +235,30 @@ inline void loaded_yield(const Model<S, N, Cap>& model, const std::array<S, N>& 
   }
 }
 
-/// What a term of Model::own_term() does, and how it goes on beside this reading.
+/// Adds what a term of Model::own_term() does, and how it goes on beside this reading.
 template <class S, std::size_t N, class Cap>
-inline Local<S> own_yield(const Model<S, N, Cap>& model, const Term<S>& term, const S& q,
-                          const Context<S, N>& context) {
+inline void add_own_yield(const Model<S, N, Cap>& model, const Term<S>& term, const S& q,
+                          const Context<S, N>& context, Local<S>& sum) {
   S k = term.coefficient;
   if (term.basis == Basis::curve) {
     if (term.factor == Factor::temperature) k *= context.temperature_c - model.reference_temperature();
     if (term.factor == Factor::payload) k *= context.payload_kg;
     const Local<S> at = local_curve(model, term, q);
-    return {k * at.value, k * at.slope, k * at.half_curvature};
+    sum.value += k * at.value;
+    sum.slope += k * at.slope;
+    sum.half_curvature += k * at.half_curvature;
+  } else if (term.basis == Basis::reading) {
+    sum.value += k * q;
+    sum.slope += k;
+  } else {
+    const S order = term.argument;
+    const SinCos<S> wave = sin_cos(order * q);
+    const bool is_sine = term.basis == Basis::sine;
+    const S f = k * (is_sine ? wave.s : wave.c);
+    sum.value += f;
+    sum.slope += k * order * (is_sine ? wave.c : -wave.s);
+    sum.half_curvature -= S(0.5) * order * order * f;
   }
-  if (term.basis == Basis::reading) return {k * q, k, S(0)};
-  const S order = term.argument;
-  const SinCos<S> wave = sin_cos(order * q);
-  const S half = S(-0.5) * k * order * order;
-  if (term.basis == Basis::sine) return {k * wave.s, k * order * wave.c, half * wave.s};
-  return {k * wave.c, -k * order * wave.s, half * wave.c};
 }
 
 }  // namespace detail

@@ -41,6 +41,13 @@ struct LinkShape {
   bool has_beta = false;
 };
 
+/// A small rigid motion: of the point at the origin of its frame (m) and about it (rad).
+template <class S>
+struct Twist {
+  Triple<S> linear;
+  Triple<S> angular;
+};
+
 /// Rigid transform of six small values: Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and rad.
 template <class S>
 inline Pose<S> small_pose(const std::array<S, 6>& v) {
@@ -71,7 +78,7 @@ class Model {
     tool_ = {};
     load_edit_ = {};
     link_moves_ = {};
-    has_base_ = base_moves_ = tool_moves_ = needs_loads_ = false;
+    has_base_ = base_moves_ = tool_moves_ = needs_loads_ = reads_direction_ = false;
     effect_count_ = table_count_ = value_count_ = 0;
     for (std::size_t i = 0; i < N; ++i) {
       const NominalLink& link = robot.links[i];
@@ -183,6 +190,7 @@ class Model {
     }
     if (effect_count_ >= Cap::terms) return Refusal::too_many_terms;
     effects_[effect_count_++] = term;
+    if (reads_direction(term)) reads_direction_ = true;
     if (flexcomp::needs_loads(term.basis, term.factor)) needs_loads_ = true;
     if (p.body == body::base) {
       has_base_ = true;
@@ -210,6 +218,7 @@ class Model {
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     sort_effects();
+    take_twists();
   }
 
   /// All of a term list at once.
@@ -245,6 +254,7 @@ class Model {
   bool base_moves() const { return base_moves_; }
   bool tool_moves() const { return tool_moves_; }
   bool needs_loads() const { return needs_loads_; }
+  bool reads_direction() const { return reads_direction_; }  ///< of the context
   /// Bits 1 << slot of link i that some effect moves.
   std::uint8_t link_moves(std::size_t i) const { return link_moves_[i]; }
   std::size_t effect_count() const { return effect_count_; }
@@ -277,8 +287,21 @@ class Model {
   bool turns_tool() const { return turns_tool_; }
   /// Nominal tool rotation times the inverse of the one with constant terms.
   const Matrix3<S>& tool_turn() const { return tool_turn_; }
+  /// What the constant terms of link i do, seen from the frame after it and to first order; the last one with what the
+  /// tool's do.
+  const Twist<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
+  /// Constant part of the offset of joint i, rad.
+  S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }
+  /// What B does, in Fb at its origin.
+  const Twist<S>& base_twist() const { return base_twist_; }
 
  private:
+  bool reads_direction(const Term<S>& t) const {
+    if (t.basis == Basis::direction) return true;
+    return t.basis == Basis::grid && (tables_[t.table].row_covariate == Covariate::direction ||
+                                      tables_[t.table].column_covariate == Covariate::direction);
+  }
+
   enum Group : std::uint8_t { lever = 0, other_loaded = 1, own = 2, other = 3, groups = 4, summed = 5, none = 6 };
   static_assert(Cap::terms <= 255, "effects are counted in bytes");
 
@@ -350,6 +373,48 @@ class Model {
       }
     }
   }
+  /// The motion that takes the first pose's frame into the second one's, in the first frame and to first order.
+  static Twist<S> twist_between(const Pose<S>& from, const Pose<S>& to) {
+    const Matrix3<S>& r = from.rotation;
+    const Triple<S> shift = triple<S>(to.position) - triple<S>(from.position);
+    const auto into = [&r](const Triple<S>& v) {
+      return Triple<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z, r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
+                       r(0, 2) * v.x + r(1, 2) * v.y + r(2, 2) * v.z};
+    };
+    Triple<S> turn = {S(0), S(0), S(0)};
+    for (int k = 0; k < 3; ++k) {
+      turn = turn + cross(Triple<S>{r(0, k), r(1, k), r(2, k)},
+                          Triple<S>{to.rotation(0, k), to.rotation(1, k), to.rotation(2, k)});
+    }
+    return {into(shift), into(turn * S(0.5))};
+  }
+  /// A link without its joint's turn.
+  static Pose<S> still_link(const LinkShape<S>& link, const SinCos<S>& theta) {
+    Pose<S> p;
+    const SinCos<S>&a = link.alpha, &b = link.beta;
+    p.position = Vector3<S>(link.a * theta.c, link.a * theta.s, link.d);
+    // Rot(z) Rot(x) Rot(y)
+    p.rotation << theta.c * b.c - theta.s * a.s * b.s, -theta.s * a.c, theta.c * b.s + theta.s * a.s * b.c,
+        theta.s * b.c + theta.c * a.s * b.s, theta.c * a.c, theta.s * b.s - theta.c * a.s * b.c,  //
+        -a.c * b.s, a.s, a.c * b.c;
+    return p;
+  }
+  void take_twists() {
+    for (std::size_t i = 0; i < N; ++i) {
+      const SinCos<S> none = {S(0), S(1)};
+      link_twist_[i] = twist_between(still_link(nominal_[i], none),
+                                     still_link(shape_[i], sin_cos(constant_[i][slot::theta])));
+    }
+    // The tool's motion is seen from the flange, where the last link's is.
+    const Twist<S> tool = twist_between(nominal_tool_, tool_pose_);
+    const ThreeTriples<S> turned = columns_of(nominal_tool_.rotation);
+    const Triple<S> angular = combine(turned, tool.angular);
+    Twist<S>& last = link_twist_[N - 1];
+    last.linear = last.linear + combine(turned, tool.linear) + cross(triple<S>(nominal_tool_.position), angular);
+    last.angular = last.angular + angular;
+    base_twist_ = twist_between(Pose<S>(), base_pose_);
+  }
+
   static bool comes_before(const Term<S>& a, const Term<S>& b) {
     return a.joint != b.joint ? a.joint < b.joint : a.argument < b.argument;
   }
@@ -379,6 +444,7 @@ class Model {
   bool base_moves_ = false;
   bool tool_moves_ = false;
   bool needs_loads_ = false;
+  bool reads_direction_ = false;
   bool axial_gravity_ = true;
   std::array<std::uint8_t, N> link_moves_{};
   bool only_joints_yield_ = true;
@@ -386,6 +452,8 @@ class Model {
   bool turns_tool_ = false;
   std::array<S, N> compliance_{};
   S inverse_gravity_ = S(0);
+  std::array<Twist<S>, N> link_twist_{};
+  Twist<S> base_twist_{};
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
   std::array<std::uint8_t, groups> group_end_{};
   std::array<std::uint8_t, Cap::terms> order_{};

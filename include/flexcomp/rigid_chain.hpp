@@ -20,20 +20,19 @@ struct JointAxis {
   Triple<S> origin;
 };
 
-template <class S, std::size_t N>
-struct RigidChain {
-  std::array<JointAxis<S>, N> joint;
-  ThreeTriples<S> flange;  ///< columns of its rotation
-  Triple<S> end;           ///< its origin
+template <class S>
+struct FlangePose {
+  ThreeTriples<S> axes;  ///< columns of its rotation
+  Triple<S> origin;
 };
 
 /// Carries the chain from F0 to the flange. `angle` are the sines and cosines with the links' offsets.
 template <class S, std::size_t N>
 inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
-                       RigidChain<S, N>& chain) {
+                       std::array<JointAxis<S>, N>& joints, FlangePose<S>& flange) {
   // The first link starts from the axes of F0, which leaves little of it.
   const LinkShape<S>& first = links[0];
-  chain.joint[0] = {{S(0), S(0), S(1)}, {S(0), S(0), S(0)}};
+  joints[0] = {{S(0), S(0), S(1)}, {S(0), S(0), S(0)}};
   S xx = angle[0].c, xy = angle[0].s, xz = S(0);
   S px = first.a * xx, py = first.a * xy, pz = first.d;
   S yz = first.alpha.s, zz = first.alpha.c;
@@ -52,7 +51,7 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
   }
   for (std::size_t i = 1; i < N; ++i) {
     const LinkShape<S>& link = links[i];
-    JointAxis<S>& joint = chain.joint[i];
+    JointAxis<S>& joint = joints[i];
     joint.axis.x = zx;
     joint.axis.y = zy;
     joint.axis.z = zz;
@@ -98,8 +97,52 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
       zz = cb * zz + sb * t;
     }
   }
-  chain.flange = {{xx, xy, xz}, {yx, yy, yz}, {zx, zy, zz}};
-  chain.end = {px, py, pz};
+  flange.axes = {{xx, xy, xz}, {yx, yy, yz}, {zx, zy, zz}};
+  flange.origin = {px, py, pz};
+}
+
+/// How the constant terms move the flange of the nominal chain, to first order: twists carried from the flange to F0,
+/// where the motion is given at the origin. `angle` as in the nominal rigid_pass().
+template <class S, std::size_t N, class Cap>
+inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle, Twist<S>& out) {
+  S vx = S(0), vy = S(0), vz = S(0);
+  S wx = S(0), wy = S(0), wz = S(0);
+  for (std::size_t i = N; i-- > 0;) {
+    const LinkShape<S>& link = model.nominal(i);
+    const Twist<S>& own = model.link_twist(i);
+    vx += own.linear.x;
+    vy += own.linear.y;
+    vz += own.linear.z;
+    wx += own.angular.x;
+    wy += own.angular.y;
+    wz += own.angular.z;
+    if (link.has_beta) {
+      const S cb = link.beta.c, sb = link.beta.s;
+      S t = vx;
+      vx = cb * vx + sb * vz;
+      vz = cb * vz - sb * t;
+      t = wx;
+      wx = cb * wx + sb * wz;
+      wz = cb * wz - sb * t;
+    }
+    const S ca = link.alpha.c, sa = link.alpha.s;
+    S my = ca * vy - sa * vz;
+    vz = sa * vy + ca * vz;
+    const S ny = ca * wy - sa * wz;
+    wz = sa * wy + ca * wz;
+    const S d = link.d, a = link.a;
+    vx -= d * ny;
+    my += d * wx;
+    my -= a * wz;
+    vz += a * ny;
+    const S c = angle[i].c, s = angle[i].s;
+    vy = s * vx + c * my;
+    vx = c * vx - s * my;
+    wy = s * wx + c * ny;
+    wx = c * wx - s * ny;
+  }
+  out.linear = {vx, vy, vz};
+  out.angular = {wx, wy, wz};
 }
 
 }  // namespace detail

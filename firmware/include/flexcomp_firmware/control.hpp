@@ -38,10 +38,7 @@ struct ControlSettings {
   OnRefusal on_refusal = OnRefusal::pass_through;
 };
 
-struct StepResult {
-  Joints q;  ///< corrected joint command, rad
-  StepStatus status;
-};
+using StepResult = Compensated<Scalar, joints>;
 
 /// What the cycle tells the background: single words, each written by the cycle alone.
 struct ControlPublication {
@@ -60,7 +57,8 @@ class ControlCycle {
   /// largest correction) are replaced by 0: no correction rather than a wild one.
   ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings);
 
-  /// One control cycle. `context.direction` is not read: the step tracks the directions from the commands.
+  /// One control cycle. The step tracks the directions from the commands and takes no notice of
+  /// `context.direction` (which must be finite all the same).
   ///
   /// A set is taken at the start and used to the end. When the set changes, the difference between the
   /// correction of the cycle before and the new set's is kept and decays to zero over fade_cycles, as v^2 (3
@@ -81,6 +79,7 @@ class ControlCycle {
   enum class Source : std::uint8_t { pass, set, hold };
 
   void track(const Joints& q);
+  StepResult corrected(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context) const;
   Scalar within_limits(std::size_t joint, Scalar q_command, Scalar q) const;
   void publish(StepStatus status);
 
