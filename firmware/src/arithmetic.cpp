@@ -3,10 +3,9 @@
 namespace flexcomp {
 namespace firmware {
 
-Compensated<Scalar, joints> corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
-                                              const FirmwareContext& context,
-                                              const CompensationSettings<Scalar>& settings) {
-  return compensate(model, q_command_rad, context, settings);
+void corrected_command(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
+                       const CompensationSettings<Scalar>& settings, Compensated<Scalar, joints>& out) {
+  compensate(model, q_command_rad, context, settings, out);
 }
 
 Miss missed(const FirmwareModel& model, const Joints& q_rad, const Joints& q_command_rad,

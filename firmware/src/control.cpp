@@ -79,22 +79,27 @@ void ControlCycle::publish(StepStatus status) {
   count(publication_.cycles);
   count(publication_.cycles_by_status[static_cast<std::size_t>(status)]);
   publication_.last_status.store(static_cast<std::uint32_t>(status), std::memory_order_relaxed);
+  Scalar largest = largest_;
   for (std::size_t j = 0; j < joints; ++j) {
     const Scalar c = correction_[j];
     publication_.correction_rad[j].store(float_bits(static_cast<float>(c)), std::memory_order_relaxed);
-    if (c > largest_) largest_ = c;
-    if (-c > largest_) largest_ = -c;
+    const Scalar magnitude = c < Scalar(0) ? -c : c;
+    if (magnitude > largest) largest = magnitude;
   }
+  largest_ = largest;
   publication_.largest_correction_rad.store(float_bits(static_cast<float>(largest_)),
                                             std::memory_order_relaxed);
 }
 
-StepResult ControlCycle::corrected(const FirmwareModel& model, const Joints& q_command_rad,
-                                   const FirmwareContext& context) const {
-  if (!model.reads_direction()) return corrected_command(model, q_command_rad, context, settings_.compensation);
+void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
+                           StepResult& out) const {
+  if (!model.reads_direction()) {
+    corrected_command(model, q_command_rad, context, settings_.compensation, out);
+    return;
+  }
   FirmwareContext tracked = context;
   tracked.direction = direction_;
-  return corrected_command(model, q_command_rad, tracked, settings_.compensation);
+  corrected_command(model, q_command_rad, tracked, settings_.compensation, out);
 }
 
 StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context) {
@@ -116,8 +121,13 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
     return out;
   }
   track(q_command_rad);
-  StepResult out = index == Handover::none ? StepResult{q_command_rad, StepStatus::no_set}
-                                           : corrected(sets_.models[index], q_command_rad, context);
+  StepResult out;
+  if (index == Handover::none) {
+    out.q = q_command_rad;
+    out.status = StepStatus::no_set;
+  } else {
+    correct(sets_.models[index], q_command_rad, context, out);
+  }
   Source source = Source::pass;
   if (out.status < StepStatus::no_set) {
     source = Source::set;

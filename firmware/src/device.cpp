@@ -74,8 +74,8 @@ wire::ProbeResponse Device::probe(const wire::ProbeRequest& request) const {
     out.status = static_cast<std::uint16_t>(StepStatus::no_set);
     return out;
   }
-  const Compensated<Scalar, joints> compensated =
-      corrected_command(*model, q, context, cycle_.settings().compensation);
+  Compensated<Scalar, joints> compensated;
+  corrected_command(*model, q, context, cycle_.settings().compensation, compensated);
   out.status = static_cast<std::uint16_t>(compensated.status);
   if (compensated.status == StepStatus::refused) return out;
   const Miss residual = missed(*model, compensated.q, q, context);

@@ -398,15 +398,6 @@ struct Aim {
   Triple<S> tool_point;
 };
 
-/// The transpose of a rotation times v.
-template <class S>
-inline void turn_back(const Matrix3<S>& b, Triple<S>& v) {
-  const S x = v.x, y = v.y, z = v.z;
-  v.x = b(0, 0) * x + b(1, 0) * y + b(2, 0) * z;
-  v.y = b(0, 1) * x + b(1, 1) * y + b(2, 1) * z;
-  v.z = b(0, 2) * x + b(1, 2) * y + b(2, 2) * z;
-}
-
 template <class S, std::size_t N, class Cap>
 inline void take_aim(const Model<S, N, Cap>& model, const FlangePose<S>& nominal, const Triple<S>& tool_point,
                      Aim<S>& aim) {
@@ -418,23 +409,45 @@ inline void take_aim(const Model<S, N, Cap>& model, const FlangePose<S>& nominal
   }
   if (model.has_base()) {
     const Vector3<S>& p = model.base_pose().position;
-    const Matrix3<S>& b = model.base_pose().rotation;
     aim.tool_point.x -= p[0];
     aim.tool_point.y -= p[1];
     aim.tool_point.z -= p[2];
-    turn_back(b, aim.flange.a);
-    turn_back(b, aim.flange.b);
-    turn_back(b, aim.flange.c);
-    turn_back(b, aim.tool_point);
+    const Matrix3<S>& b = model.base_pose().rotation;
+    const S xx = b(0, 0), xy = b(1, 0), xz = b(2, 0);
+    const S yx = b(0, 1), yy = b(1, 1), yz = b(2, 1);
+    const S zx = b(0, 2), zy = b(1, 2), zz = b(2, 2);
+    for (Triple<S>* v : {&aim.flange.a, &aim.flange.b, &aim.flange.c, &aim.tool_point}) {
+      const S x = v->x, y = v->y, z = v->z;
+      v->x = xx * x + xy * y + xz * z;
+      v->y = yx * x + yy * y + yz * z;
+      v->z = zx * x + zy * y + zz * z;
+    }
   }
+}
+
+template <class S, std::size_t N>
+inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
+                        std::array<SinCos<S>, N>& angle) {
+  for (std::size_t i = 0; i < N; ++i) {
+    S s, c;
+    sin_cos_kernel(q[i], s, c);
+    const S os = links[i].offset.s, oc = links[i].offset.c;
+    angle[i].s = s * oc + c * os;
+    angle[i].c = c * oc - s * os;
+  }
+}
+
+template <class S, std::size_t N>
+FLEXCOMP_ONCE void rotate_all_far(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
+  for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
 }
 
 /// Turns all angles; `square` is the sum of the squares. Without the last terms of rotate(): up to 1/64 rad they leave
 /// 1e-11.
 template <class S, std::size_t N>
-inline void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
+FLEXCOMP_ONCE void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
   if (!(square < S(0.000244140625))) {
-    for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
+    rotate_all_far(angle, by);
     return;
   }
   for (std::size_t i = 0; i < N; ++i) {
@@ -442,9 +455,15 @@ inline void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& 
     const S z = d * d;
     const S sine = d - d * (z * S(1.0 / 6));
     const S versine = z * (S(0.5) - z * S(1.0 / 24));
-    const S s = angle[i].s, c = angle[i].c;
-    angle[i].s = s + (c * sine - s * versine);
-    angle[i].c = c - (s * sine + c * versine);
+    S s = angle[i].s, c = angle[i].c;
+    const S t = s;
+    s += c * sine;
+    s -= t * versine;
+    angle[i].s = s;
+    const S u = c;
+    c -= t * sine;
+    c -= u * versine;
+    angle[i].c = c;
   }
 }
 
@@ -491,13 +510,13 @@ template <class S>
 struct Enough {
   static constexpr S correction = S(1e-8);        ///< the next one is a third-order rest of it
   static constexpr S refinement = S(1e-19);       ///< square of what the next refinement would be
-  static constexpr S yield_step = S(1e-14);       ///< the next one is smaller by the slope
+  static constexpr S yield_step = S(1e-20);  ///< square of what the next evaluation would change
 };
 template <>
 struct Enough<float> {
   static constexpr float correction = 1e-6F;
   static constexpr float refinement = 1e-14F;
-  static constexpr float yield_step = 1e-8F;
+  static constexpr float yield_step = 1e-14F;
 };
 
 /// For sets whose effects all turn joints. The arm is then a rigid chain, whose joints stand at psi = q + yield(q):
@@ -534,25 +553,27 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
   }
   rotate_all(angle, by, turned);
 
-  // The yield is taken here already, some milliradians beside the reading: off by that times its slope.
   const bool loaded = model.yields_to_loads() || model.lever_count() != 0;
   const bool direct = model.own_count() + model.other_count() != 0;
   CarriedLoad<S> load;
   std::array<S, N> yield;
-  if (loaded) {
-    carried_load(model, context, load);
-    loaded_yield(model, q, angle, load, yield);
-  } else {
-    for (S& y : yield) y = S(0);
-  }
-
+  if (loaded) carried_load(model, context, load);
   std::array<JointAxis<S>, N> joints;
   FlangePose<S> flange;
+  YieldAround<S, N> around;
   bool fresh = false;
   for (int k = 1;; ++k) {
     rigid_pass(model.shapes(), angle, joints, flange);
     Triple<S> point;
     flange_point(flange, model.tool_pose().position, point);
+    if (k == 1 && loaded) {
+      if (load.is_plain) {
+        around.set(model, q, joints, flange, load, yield);
+      } else {
+        // At the joint's angle instead of its reading: off by itself times its slope.
+        loaded_yield(model, q, angle, load, yield);
+      }
+    }
     const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y, aim.tool_point.z - point.z};
     Triple<S> turn;
     rotation_error(aim.flange, flange.axes, turn);
@@ -565,8 +586,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
       fresh = true;
     }
     S square = corrector.solve(shift, turn, largest, largest_turn, dq);
-    bool done = true;
-    for (int n = 0; n < most_refinements && !fresh; ++n) {
+    bool done = fresh;
+    for (int n = 0; n < most_refinements && !done; ++n) {
       // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
       // order of the motion with it.
       motion(joints, point, dq, move);
@@ -583,16 +604,18 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
         dq[i] = d;
         square += d * d;
       }
-      if (done) break;
     }
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
     if (k == most_corrections - 1) break;
     // Where something is given up the last correction decides how much, so there it is never left out.
-    if (done && !corrector.gave_up() && square <= (fresh ? S(0.1) : S(1)) * Enough<S>::correction) break;
+    if (done && !corrector.gave_up() && square <= (fresh ? S(0.02) : S(1)) * Enough<S>::correction) break;
     rotate_all(angle, dq, square);
   }
   if (!loaded && !direct) return;
+  if (!loaded) {
+    for (S& y : yield) y = S(0);
+  }
 
   // q was psi until here. Now it becomes the reading x with x + own(x) + yield(x) = psi; the angles lag by dq.
   if (direct) add_other_yield(model, q, context, yield);
@@ -605,6 +628,17 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
     share[i] = S(1);
   }
   if (model.own_count() != 0) take_own_yield(model, context, q, dq, share);
+  if (loaded && load.is_plain) {
+    std::array<S, N> change;
+    around.change(model, joints, dq, change);
+    FLEXCOMP_UNROLL
+    for (std::size_t i = 0; i < N; ++i) {
+      const S step = change[i] * share[i];
+      yield[i] += change[i];
+      q[i] -= step;
+      dq[i] -= step;
+    }
+  }
   S square = square_of(dq);
   for (int k = 0; k < most_yield_steps; ++k) {
     std::array<S, N> now;
@@ -615,17 +649,20 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
       for (S& y : now) y = S(0);
     }
     if (direct) add_other_yield(model, q, context, now);
+    S size = S(0);
     square = S(0);
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) {
       const S y = now[i];
+      size += y * y;
       const S step = (yield[i] - y) * share[i];
       yield[i] = y;
       dq[i] = step;
       q[i] += step;
       square += step * step;
     }
-    if (square <= Enough<S>::yield_step) break;
+    // What this step leaves is smaller by the slope, and the yield is a wave of some rad: its slope is like its size.
+    if (square * size <= Enough<S>::yield_step) break;
   }
 }
 
@@ -675,23 +712,20 @@ inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, co
 /// (a joint deflected by more than 1e4 rad, a product that overflows). Otherwise the result is finite, within
 /// the joint limits, and no joint differs from its command by more than settings.largest_correction_rad.
 template <class S, std::size_t N, class Cap>
-inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
-                                    const Context<S, N>& context,
-                                    const CompensationSettings<S>& settings = {}) {
-  Compensated<S, N> out;
+inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
+                       const Context<S, N>& context, const CompensationSettings<S>& settings,
+                       Compensated<S, N>& out) {
+  out.status = StepStatus::refused;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) out.q[i] = q_command[i];
   for (std::size_t i = 0; i < N; ++i) {
-    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return out;
+    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return;
   }
   // Asked here because a table holds its end values outside its nodes and would hide a NaN.
-  if (!detail::is_finite_context(context)) return out;
+  if (!detail::is_finite_context(context)) return;
   const S largest = settings.largest_correction_rad;
   std::array<SinCos<S>, N> angle;
-  for (std::size_t i = 0; i < N; ++i) {
-    const SinCos<S> reading = sin_cos(q_command[i]);
-    angle[i] = compose(reading, model.nominal(i).offset);
-  }
+  detail::sin_cos_all(q_command, model.nominals(), angle);
   detail::Corrector<S, N> corrector;
   Triple<S> tool_point;
   detail::Aim<S> aim;
@@ -718,7 +752,7 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
     const S change = q[i] - q_command[i];
     square += change * change;
   }
-  if (!(square < S(1e8))) return out;
+  if (!(square < S(1e8))) return;
   out.status = corrector.gave_up() ? StepStatus::near_singular : StepStatus::ok;
   if (square > largest * largest) {
     std::array<S, N> change;
@@ -741,6 +775,14 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
     }
     out.q[i] = x;
   }
+}
+
+template <class S, std::size_t N, class Cap>
+inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
+                                    const Context<S, N>& context,
+                                    const CompensationSettings<S>& settings = {}) {
+  Compensated<S, N> out;
+  compensate(model, q_command, context, settings, out);
   return out;
 }
 

@@ -28,6 +28,7 @@ struct CarriedLoad {
   Triple<S> com_m;         ///< in the flange frame
   Triple<S> force_n;       ///< external, at the tool point, in F0
   bool has_force = false;  ///< external
+  bool is_plain = false;   ///< no external force, and gravity along z of F0
 };
 
 template <class S, std::size_t N, class Cap>
@@ -40,6 +41,7 @@ inline void carried_load(const Model<S, N, Cap>& model, const Context<S, N>& con
   load.force_n = {context.force_n[0], context.force_n[1], context.force_n[2]};
   load.has_force = load.force_n.x < S(0) || load.force_n.x > S(0) || load.force_n.y < S(0) ||
                    load.force_n.y > S(0) || load.force_n.z < S(0) || load.force_n.z > S(0);
+  load.is_plain = !load.has_force && model.has_axial_gravity();
 }
 
 /// A direction from the frame after a link into the one between its Rot(z) and its Trans.
@@ -194,11 +196,44 @@ inline Local<S> local_curve(const Model<S, N, Cap>& model, const Term<S>& term, 
   return {p0 + u * (p1 + u * (p2 + k3)), (p1 + u * (bend + p2)) * per_rad, bend * per_rad * per_rad};
 }
 
+/// Adds what levers and other loaded terms do, once the torques are known; lever(joint, far) gives a lever.
+template <class S, std::size_t N, class Cap, class Lever>
+inline void add_levers(const Model<S, N, Cap>& model, const Lever& lever, std::array<S, N>& delta) {
+  const std::size_t count = model.lever_count();
+  std::uint32_t which = ~0U;
+  S value = S(0);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Term<S>& term = model.lever_term(k);
+    // Equal levers stand side by side.
+    const std::uint32_t this_one = (std::uint32_t{term.joint} << 16U) | term.table;
+    if (this_one != which) {
+      which = this_one;
+      value = lever(term.joint, term.table);
+    }
+    delta[term.place.body - 1U] += term.coefficient * value;
+  }
+}
+template <class S, std::size_t N, class Cap>
+FLEXCOMP_ONCE void add_other_loaded(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+                                    const std::array<S, N>& torques, std::array<S, N>& delta) {
+  for (std::size_t k = 0; k < model.other_loaded_count(); ++k) {
+    const Term<S>& term = model.other_loaded_term(k);
+    const S torque = torques[term.joint];
+    S value = term.coefficient * torque;
+    if (term.basis == Basis::load_torque_cubed) {
+      value *= torque * torque;
+    } else if (term.basis == Basis::curve) {
+      value *= local_curve(model, term, q[term.joint]).value;
+    }
+    delta[term.place.body - 1U] += value;
+  }
+}
+
 /// What the load and the links' own weight do to every joint (rad): compliances, levers, and curves times torque.
 template <class S, std::size_t N, class Cap>
-inline void loaded_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q,
-                         const std::array<SinCos<S>, N>& angle, const CarriedLoad<S>& load,
-                         std::array<S, N>& delta) {
+FLEXCOMP_ONCE void loaded_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+                                const std::array<SinCos<S>, N>& angle, const CarriedLoad<S>& load,
+                                std::array<S, N>& delta) {
   LinkLoads<S, N> loads;
   carry(model.shapes(), angle, load.gravity, load.com_m, loads);
   const S mass = load.mass_kg;
@@ -209,31 +244,115 @@ inline void loaded_yield(const Model<S, N, Cap>& model, const std::array<S, N>& 
     delta[i] = model.compliance(i) * torque;
   }
   if (load.has_force) add_force_torques(model, angle, load, loads.torque, delta);
-  std::size_t joint = N, far = N;
-  S lever = S(0);
-  for (std::size_t k = 0; k < model.lever_count(); ++k) {
-    const Term<S>& term = model.lever_term(k);
-    // Equal levers stand side by side.
-    const std::size_t term_far = static_cast<std::size_t>(truncate(term.argument));
-    if (term.joint != joint || term_far != far) {
-      joint = term.joint;
-      far = term_far;
-      lever = carried_lever(model, angle, loads, joint, far);
-    }
-    delta[term.place.body - 1U] += term.coefficient * lever;
-  }
-  for (std::size_t k = 0; k < model.other_loaded_count(); ++k) {
-    const Term<S>& term = model.other_loaded_term(k);
-    const S torque = loads.torque[term.joint];
-    S value = term.coefficient * torque;
-    if (term.basis == Basis::load_torque_cubed) {
-      value *= torque * torque;
-    } else if (term.basis == Basis::curve) {
-      value *= local_curve(model, term, q[term.joint]).value;
-    }
-    delta[term.place.body - 1U] += value;
-  }
+  add_levers(
+      model,
+      [&](std::size_t joint, std::size_t far) { return carried_lever(model, angle, loads, joint, far); }, delta);
+  if (model.other_loaded_count() != 0) add_other_loaded(model, q, loads.torque, delta);
 }
+
+/// loaded_yield() at the angles of a chain whose axes are at hand, and how it changes beside them: moments about the
+/// axes in F0, as in forward.hpp. Only for gravity along z of F0 and without external force (CarriedLoad::is_plain).
+/// The change leaves out what is of second order, and the bend of links between a lever's ends: it is there to start
+/// well, not to end with.
+template <class S, std::size_t N>
+class YieldAround {
+ public:
+  template <class Cap>
+  void set(const Model<S, N, Cap>& model, const std::array<S, N>& q, const std::array<JointAxis<S>, N>& joints,
+           const FlangePose<S>& flange, const CarriedLoad<S>& load, std::array<S, N>& delta) {
+    const S weight = load.gravity.z * load.mass_kg;
+    weight_ = weight;
+    const ThreeTriples<S>& f = flange.axes;
+    const S cx = load.com_m.x, cy = load.com_m.y, cz = load.com_m.z;
+    const S ax = flange.origin.x + (f.a.x * cx + f.b.x * cy + f.c.x * cz);
+    const S ay = flange.origin.y + (f.a.y * cx + f.b.y * cy + f.c.y * cz);
+    const S az = flange.origin.z + (f.a.z * cx + f.b.z * cy + f.c.z * cz);
+    for (std::size_t i = 0; i < N; ++i) {
+      const JointAxis<S>& j = joints[i];
+      const S zx = j.axis.x, zy = j.axis.y, zz = j.axis.z;
+      const S rx = ax - j.origin.x, ry = ay - j.origin.y, rz = az - j.origin.z;
+      arm_[i].x = zy * rz - zz * ry;
+      arm_[i].y = zz * rx - zx * rz;
+      delta[i] = (zx * ry - zy * rx) * weight * model.compliance(i);
+    }
+    levers_ = 0;
+    const S sign = load.gravity.z * model.inverse_gravity();
+    add_levers(
+        model,
+        [&](std::size_t joint, std::size_t far) {
+          const Triple<S>& z = joints[joint].axis;
+          const Triple<S>&near = joints[joint].origin, &end = joints[far].origin;
+          const S rx = end.x - near.x, ry = end.y - near.y, rz = end.z - near.z;
+          const S x = z.y * rz - z.z * ry, y = z.z * rx - z.x * rz, h = z.x * ry - z.y * rx;
+          const S square = x * x + y * y + h * h;
+          using std::sqrt;
+          const S k = square > S(1e-6) ? sign / sqrt(square) : S(0);
+          if (levers_ < most_levers) {
+            lever_[levers_].x = x * k;
+            lever_[levers_].y = y * k;
+          }
+          ++levers_;
+          return h * k;
+        },
+        delta);
+    if (model.other_loaded_count() != 0) {
+      std::array<S, N> torque;
+      for (std::size_t i = 0; i < N; ++i) {
+        const JointAxis<S>& j = joints[i];
+        torque[i] = (j.axis.x * (ay - j.origin.y) - j.axis.y * (ax - j.origin.x)) * weight;
+      }
+      add_other_loaded(model, q, torque, delta);
+    }
+  }
+
+  /// By how much the yield changes (rad) when the joints turn by `by`.
+  template <class Cap>
+  void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints, const std::array<S, N>& by,
+              std::array<S, N>& delta) const {
+    // The arm's z is what the weight turns a joint by; outer joints move its end, inner ones turn it as a whole.
+    S ux = S(0), uy = S(0);
+    for (std::size_t i = N; i-- > 0;) {
+      const S v = by[i];
+      ux += arm_[i].x * v;
+      uy += arm_[i].y * v;
+      delta[i] = joints[i].axis.x * uy - joints[i].axis.y * ux;
+    }
+    std::array<Planar, N> turned;
+    S wx = S(0), wy = S(0);
+    const S weight = weight_;
+    for (std::size_t i = 0; i < N; ++i) {
+      const S v = by[i];
+      S d = delta[i];
+      d += wx * arm_[i].y;
+      d -= wy * arm_[i].x;
+      wx += joints[i].axis.x * v;
+      wy += joints[i].axis.y * v;
+      turned[i].x = wx;
+      turned[i].y = wy;
+      delta[i] = d * weight * model.compliance(i);
+    }
+    if (levers_ > most_levers) return;
+    const Planar* next = lever_.data();
+    add_levers(
+        model,
+        [&](std::size_t joint, std::size_t) {
+          const Planar& b = *next++;
+          return turned[joint].x * b.y - turned[joint].y * b.x;
+        },
+        delta);
+  }
+
+ private:
+  struct Planar {
+    S x, y;
+  };
+  static constexpr std::size_t most_levers = 4;
+
+  std::array<Planar, N> arm_;  ///< x, y of axis x (centre of mass - origin)
+  std::array<Planar, most_levers> lever_;  ///< x, y of axis x (far - near) as a unit vector; its z is the lever
+  std::size_t levers_;
+  S weight_;
+};
 
 /// Adds what a term of Model::own_term() does, and how it goes on beside this reading.
 template <class S, std::size_t N, class Cap>

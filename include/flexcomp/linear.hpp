@@ -6,14 +6,7 @@
 
 #include <Eigen/Core>
 
-/// Before a short loop over the joints: on a small controller counting would cost as much as what is counted.
-#if defined(__clang__)
-#define FLEXCOMP_UNROLL _Pragma("clang loop unroll(full)")
-#elif defined(__GNUC__)
-#define FLEXCOMP_UNROLL _Pragma("GCC unroll 8")
-#else
-#define FLEXCOMP_UNROLL
-#endif
+#include "flexcomp/compiler.hpp"
 
 namespace flexcomp {
 

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "flexcomp/compiler.hpp"
+
 namespace flexcomp {
 
 constexpr double pi = 3.14159265358979323846;
@@ -30,29 +32,28 @@ inline std::int32_t nearest(S t) {
 
 /// Rotates (s, c) of the reduced angle by n quarter turns.
 template <class S>
-inline SinCos<S> quadrant(std::int32_t n, S s, S c) {
-  switch (static_cast<std::uint32_t>(n) & 3U) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
+inline void quadrant(std::int32_t n, S s, S c, S& sine, S& cosine) {
+  const std::uint32_t turns = static_cast<std::uint32_t>(n);
+  if ((turns & 1U) != 0) {
+    const S t = s;
+    s = c;
+    c = -t;
   }
+  if ((turns & 2U) != 0) {
+    s = -s;
+    c = -c;
+  }
+  sine = s;
+  cosine = c;
 }
 
 }  // namespace detail
 
-/// Sine and cosine of x (rad); error below 0.7 ulp of 1 for |x| <= 1e5, NaN beyond or for a NaN.
-/// Range reduction after Cody and Waite with a 33-bit head, polynomials of fdlibm (k_sin.c, k_cos.c).
-inline SinCos<double> sin_cos(double x) {
-  if (!(x <= 1e5 && x >= -1e5)) {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    return {nan, nan};
-  }
-  const std::int32_t n = detail::nearest(x * 6.36619772367581382433e-01);
+namespace detail {
+
+/// sin_cos() for |x| <= 1e5.
+inline void sin_cos_kernel(double x, double& sine, double& cosine) {
+  const std::int32_t n = nearest(x * 6.36619772367581382433e-01);
   const double k = static_cast<double>(n);
   // The head has 33 bits, so k * head is exact for |k| < 2^20; the tail carries the next 53 bits.
   const double r = (x - k * 1.57079632673412561417e+00) - k * 6.07710050650619224932e-11;
@@ -72,18 +73,12 @@ inline SinCos<double> sin_cos(double x) {
                            z * (2.48015872894767294178e-05 +
                                 z * (-2.75573143513906633035e-07 +
                                      z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
-  return detail::quadrant(n, s, c);
+  quadrant(n, s, c, sine, cosine);
 }
 
-/// Sine and cosine of x (rad); error below 0.7 ulp of 1 for |x| <= 1e4, NaN beyond or for a NaN.
-/// Three-part reduction and polynomials after Cephes (sinf.c); no double arithmetic, for single-precision
-/// FPUs.
-inline SinCos<float> sin_cos(float x) {
-  if (!(x <= 1e4F && x >= -1e4F)) {
-    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-    return {nan, nan};
-  }
-  const std::int32_t n = detail::nearest(x * 6.3661977e-01F);
+/// sin_cos() for |x| <= 1e4.
+inline void sin_cos_kernel(float x, float& sine, float& cosine) {
+  const std::int32_t n = nearest(x * 6.3661977e-01F);
   const float k = static_cast<float>(n);
   const float r = ((x - k * 1.5703125F) - k * 4.837512969970703125e-4F) - k * 7.54978995489188216e-8F;
   const float z = r * r;
@@ -91,7 +86,28 @@ inline SinCos<float> sin_cos(float x) {
   const float c =
       1.0F -
       (0.5F * z - z * z * (4.166664568298827e-2F + z * (-1.388731625493765e-3F + z * 2.443315711809948e-5F)));
-  return detail::quadrant(n, s, c);
+  quadrant(n, s, c, sine, cosine);
+}
+
+}  // namespace detail
+
+/// Sine and cosine of x (rad); error below 0.7 ulp of 1 for |x| <= 1e5, NaN beyond or for a NaN.
+/// Range reduction after Cody and Waite with a 33-bit head, polynomials of fdlibm (k_sin.c, k_cos.c).
+FLEXCOMP_ONCE inline SinCos<double> sin_cos(double x) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  SinCos<double> r{nan, nan};
+  if (x <= 1e5 && x >= -1e5) detail::sin_cos_kernel(x, r.s, r.c);
+  return r;
+}
+
+/// Sine and cosine of x (rad); error below 0.7 ulp of 1 for |x| <= 1e4, NaN beyond or for a NaN.
+/// Three-part reduction and polynomials after Cephes (sinf.c); no double arithmetic, for single-precision
+/// FPUs.
+FLEXCOMP_ONCE inline SinCos<float> sin_cos(float x) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  SinCos<float> r{nan, nan};
+  if (x <= 1e4F && x >= -1e4F) detail::sin_cos_kernel(x, r.s, r.c);
+  return r;
 }
 
 /// Sine and cosine of any other scalar (dual numbers) by the functions found beside its type.

@@ -79,7 +79,8 @@ class ControlCycle {
   enum class Source : std::uint8_t { pass, set, hold };
 
   void track(const Joints& q);
-  StepResult corrected(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context) const;
+  void correct(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
+               StepResult& out) const;
   Scalar within_limits(std::size_t joint, Scalar q_command, Scalar q) const;
   void publish(StepStatus status);
 

@@ -1,0 +1,22 @@
+/// \file
+/// What the core asks of the compiler beyond the language. Both are only about speed and size.
+#ifndef FLEXCOMP_COMPILER_HPP
+#define FLEXCOMP_COMPILER_HPP
+
+/// Before a short loop over the joints: on a small controller counting would cost as much as what is counted.
+#if defined(__clang__)
+#define FLEXCOMP_UNROLL _Pragma("clang loop unroll(full)")
+#elif defined(__GNUC__)
+#define FLEXCOMP_UNROLL _Pragma("GCC unroll 8")
+#else
+#define FLEXCOMP_UNROLL
+#endif
+
+/// For what is called from several places: once in flash.
+#if defined(__GNUC__)
+#define FLEXCOMP_ONCE __attribute__((noinline))
+#else
+#define FLEXCOMP_ONCE
+#endif
+
+#endif
