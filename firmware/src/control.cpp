@@ -102,7 +102,7 @@ void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_r
   corrected_command(model, q_command_rad, tracked, settings_.compensation, out);
 }
 
-StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context) {
+void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
   bool changed = false;
   const std::uint32_t index = sets_.handover.take(changed);
   // 0 * q is 0 but for a NaN or an infinity.
@@ -110,7 +110,8 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
   FLEXCOMP_UNROLL
   for (std::size_t j = 0; j < joints; ++j) zero += Scalar(0) * q_command_rad[j];
   if (!(zero <= Scalar(0))) {
-    StepResult out{q_command_rad, StepStatus::refused};
+    out.q = q_command_rad;
+    out.status = StepStatus::refused;
     if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
     if (settings_.on_refusal == OnRefusal::hold_last_correction) {
       for (std::size_t j = 0; j < joints; ++j) {
@@ -118,10 +119,9 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
       }
     }
     publish(out.status);
-    return out;
+    return;
   }
   track(q_command_rad);
-  StepResult out;
   if (index == Handover::none) {
     out.q = q_command_rad;
     out.status = StepStatus::no_set;
@@ -168,7 +168,6 @@ StepResult ControlCycle::step(const Joints& q_command_rad, const FirmwareContext
   }
   source_ = source;
   publish(out.status);
-  return out;
 }
 
 }  // namespace firmware

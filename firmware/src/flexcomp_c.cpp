@@ -214,11 +214,12 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]) {
   Arm& arm = arm_of(fc);
-  fw::Joints q;
-  for (std::size_t j = 0; j < fw::joints; ++j) q[j] = q_command_rad[j];
+  // An array of C and one of C++ are the same memory.
+  static_assert(sizeof(fw::Joints) == sizeof(flexcomp_real[FLEXCOMP_JOINTS]), "nothing but the numbers");
+  const fw::Joints& q = *reinterpret_cast<const fw::Joints*>(q_command_rad);
   fw::StepResult result;
   if (context == nullptr) {
-    result = arm.device.step(q, arm.context);
+    arm.device.step(q, arm.context, result);
   } else {
     fw::FirmwareContext c;
     c.payload_kg = context->payload_kg;
@@ -229,8 +230,9 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
     c.temperature_c = context->temperature_c;
     c.time_s = context->time_s;
     for (std::size_t j = 0; j < fw::joints; ++j) c.relative_speed[j] = context->relative_speed[j];
-    result = arm.device.step(q, c);
+    arm.device.step(q, c, result);
   }
+  FLEXCOMP_UNROLL
   for (std::size_t j = 0; j < fw::joints; ++j) q_corrected_rad[j] = result.q[j];
   return static_cast<flexcomp_status>(result.status);
 }

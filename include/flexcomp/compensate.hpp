@@ -394,34 +394,33 @@ inline bool is_finite_context(const Context<S, N>& c) {
 /// without B and without the tool's constant terms.
 template <class S>
 struct Aim {
-  ThreeTriples<S> flange;
+  FlangePose<S> flange;
   Triple<S> tool_point;
 };
 
+/// Turns the nominal pose, with which `aim` comes, into that.
 template <class S, std::size_t N, class Cap>
-inline void take_aim(const Model<S, N, Cap>& model, const FlangePose<S>& nominal, const Triple<S>& tool_point,
-                     Aim<S>& aim) {
-  aim.flange = nominal.axes;
-  aim.tool_point = tool_point;
+inline void take_aim(const Model<S, N, Cap>& model, Aim<S>& aim) {
+  ThreeTriples<S>& axes = aim.flange.axes;
   if (model.turns_tool()) {
     const ThreeTriples<S> turn = columns_of(model.tool_turn());
-    aim.flange = {combine(nominal.axes, turn.a), combine(nominal.axes, turn.b), combine(nominal.axes, turn.c)};
+    const ThreeTriples<S> nominal = axes;
+    axes = {combine(nominal, turn.a), combine(nominal, turn.b), combine(nominal, turn.c)};
   }
-  if (model.has_base()) {
-    const Vector3<S>& p = model.base_pose().position;
-    aim.tool_point.x -= p[0];
-    aim.tool_point.y -= p[1];
-    aim.tool_point.z -= p[2];
-    const Matrix3<S>& b = model.base_pose().rotation;
-    const S xx = b(0, 0), xy = b(1, 0), xz = b(2, 0);
-    const S yx = b(0, 1), yy = b(1, 1), yz = b(2, 1);
-    const S zx = b(0, 2), zy = b(1, 2), zz = b(2, 2);
-    for (Triple<S>* v : {&aim.flange.a, &aim.flange.b, &aim.flange.c, &aim.tool_point}) {
-      const S x = v->x, y = v->y, z = v->z;
-      v->x = xx * x + xy * y + xz * z;
-      v->y = yx * x + yy * y + yz * z;
-      v->z = zx * x + zy * y + zz * z;
-    }
+  if (!model.has_base()) return;
+  const Vector3<S>& p = model.base_pose().position;
+  aim.tool_point.x -= p[0];
+  aim.tool_point.y -= p[1];
+  aim.tool_point.z -= p[2];
+  const Matrix3<S>& b = model.base_pose().rotation;
+  const S xx = b(0, 0), xy = b(1, 0), xz = b(2, 0);
+  const S yx = b(0, 1), yy = b(1, 1), yz = b(2, 1);
+  const S zx = b(0, 2), zy = b(1, 2), zz = b(2, 2);
+  for (Triple<S>* v : {&axes.a, &axes.b, &axes.c, &aim.tool_point}) {
+    const S x = v->x, y = v->y, z = v->z;
+    v->x = xx * x + xy * y + xz * z;
+    v->y = yx * x + yy * y + yz * z;
+    v->z = zx * x + zy * y + zz * z;
   }
 }
 
@@ -520,12 +519,12 @@ struct Enough<float> {
 };
 
 /// For sets whose effects all turn joints. The arm is then a rigid chain, whose joints stand at psi = q + yield(q):
-/// psi is solved for first, without loads, and then q from it. `angle` comes with the nominal offsets.
+/// psi is solved for first, without loads, and then q from it. `angle` comes with the nominal offsets, `aim` as the
+/// nominal pose itself.
 template <class S, std::size_t N, class Cap>
-inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>& aim, const Context<S, N>& context,
+inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, const Context<S, N>& context,
                                     std::array<SinCos<S>, N>& angle, Corrector<S, N>& corrector,
-                                    const CompensationSettings<S>& settings, const Triple<S>& nominal_tool,
-                                    std::array<S, N>& q) {
+                                    const CompensationSettings<S>& settings, std::array<S, N>& q) {
   const S largest = settings.largest_correction_rad;
   std::array<S, N> dq;
   Twist<S> move;
@@ -535,12 +534,13 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
     const Twist<S>& base = model.base_twist();
     const Triple<S> turn = {-move.angular.x - base.angular.x, -move.angular.y - base.angular.y,
                             -move.angular.z - base.angular.z};
-    const S tx = nominal_tool.x, ty = nominal_tool.y, tz = nominal_tool.z;
+    const S tx = aim.tool_point.x, ty = aim.tool_point.y, tz = aim.tool_point.z;
     const Triple<S> shift = {turn.y * tz - turn.z * ty - move.linear.x - base.linear.x,
                              turn.z * tx - turn.x * tz - move.linear.y - base.linear.y,
                              turn.x * ty - turn.y * tx - move.linear.z - base.linear.z};
     corrector.solve(shift, turn, largest, largest, dq);
   }
+  take_aim(model, aim);
   std::array<S, N> by;
   S turned = S(0);
   FLEXCOMP_UNROLL
@@ -576,7 +576,7 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, const Aim<S>&
     }
     const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y, aim.tool_point.z - point.z};
     Triple<S> turn;
-    rotation_error(aim.flange, flange.axes, turn);
+    rotation_error(aim.flange.axes, flange.axes, turn);
     const S largest_turn = largest * allowed_turn<S>(k);
     // Beside a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some
     // percent: from there on it is the one close to the solution.
@@ -727,20 +727,15 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   std::array<SinCos<S>, N> angle;
   detail::sin_cos_all(q_command, model.nominals(), angle);
   detail::Corrector<S, N> corrector;
-  Triple<S> tool_point;
   detail::Aim<S> aim;
-  {
-    detail::FlangePose<S> flange;
-    detail::rigid_pass(model.nominals(), angle, corrector.joints(), flange);
-    detail::flange_point(flange, model.nominal_tool().position, tool_point);
-    detail::take_aim(model, flange, tool_point, aim);
-  }
-  corrector.set(tool_point, settings);
+  detail::rigid_pass(model.nominals(), angle, corrector.joints(), aim.flange);
+  detail::flange_point(aim.flange, model.nominal_tool().position, aim.tool_point);
+  corrector.set(aim.tool_point, settings);
   std::array<S, N> q;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
   if (model.only_joints_yield()) {
-    detail::correct_yielding_joints(model, aim, context, angle, corrector, settings, tool_point, q);
+    detail::correct_yielding_joints(model, aim, context, angle, corrector, settings, q);
   } else {
     const Pose<S> target = nominal_forward(model, q_command);
     detail::correct_any(model, target, context, settings, corrector, q);

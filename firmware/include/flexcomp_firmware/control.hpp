@@ -68,7 +68,7 @@ class ControlCycle {
   ///
   /// A command that is not finite is returned as it came (or with the last correction on its finite joints),
   /// and leaves directions, correction and fade as they were. Bounded work on any input.
-  StepResult step(const Joints& q_command_rad, const FirmwareContext& context);
+  void step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out);
 
   const ControlPublication& publication() const { return publication_; }
   const ControlSettings& settings() const { return settings_; }

@@ -33,8 +33,13 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
+  void step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
+    cycle_.step(q_command_rad, context, out);
+  }
   StepResult step(const Joints& q_command_rad, const FirmwareContext& context) {
-    return cycle_.step(q_command_rad, context);
+    StepResult out;
+    step(q_command_rad, context, out);
+    return out;
   }
 
   /// What the active set makes of one command, with an empty state (no fade; directions from the request):
