@@ -3,8 +3,9 @@
 namespace flexcomp {
 namespace firmware {
 
-void corrected_command(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
-                       const CompensationSettings<Scalar>& settings, Compensated<Scalar, joints>& out) {
+void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
+                       const FirmwareContext& context, const CompensationSettings<Scalar>& settings,
+                       Compensated<Scalar, joints>& out) {
   compensate(model, q_command_rad, context, settings, out);
 }
 

@@ -91,8 +91,8 @@ void ControlCycle::publish(StepStatus status) {
                                             std::memory_order_relaxed);
 }
 
-void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
-                           StepResult& out) const {
+void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_rad,
+                           const FirmwareContext& context, StepResult& out) const {
   if (!model.reads_direction()) {
     corrected_command(model, q_command_rad, context, settings_.compensation, out);
     return;

@@ -64,8 +64,8 @@ struct Symmetric {
 /// square of the smallest singular value, where it was larger; below the square of settings.singular_below damping
 /// sets in.
 template <class S>
-inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings, Symmetric<S>& inverse,
-                           S& regular) {
+inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings,
+                           Symmetric<S>& inverse, S& regular) {
   // 1 / trace(A^-1) = det(A) / trace(adj(A)) needs no division by a vanishing determinant.
   const S xx = a.yy * a.zz - a.yz * a.yz;
   const S yy = a.xx * a.zz - a.xz * a.xz;
@@ -221,7 +221,7 @@ class Corrector {
   /// position needs, no joint more than `largest`, plus what the orientation still needs while the tool point
   /// stays, no joint more than `largest_turn` (rad). Returns the sum of its squares.
   S solve(const Triple<S>& position, const Triple<S>& orientation, S largest, S largest_turn,
-             std::array<S, N>& dq) {
+          std::array<S, N>& dq) {
     const S px = position.x, py = position.y, pz = position.z;
     S ux = position_.xx * px + position_.xy * py + position_.xz * pz;
     S uy = position_.xy * px + position_.yy * py + position_.yz * pz;
@@ -324,8 +324,8 @@ inline void flange_point(const FlangePose<S>& flange, const Vector3<S>& at, Trip
 
 /// How the tool point (m) and the rotation (rad) move when the joints of this chain turn by dq, to second order.
 template <class S, std::size_t N>
-inline void motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool, const std::array<S, N>& dq,
-                   Twist<S>& out) {
+inline void motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool,
+                   const std::array<S, N>& dq, Twist<S>& out) {
   // From the flange inward: what the outer joints do is turned by the inner ones.
   S px = tool.x, py = tool.y, pz = tool.z;
   S wx = S(0), wy = S(0), wz = S(0);
@@ -468,8 +468,8 @@ FLEXCOMP_ONCE void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<
 
 /// What turns joints without frames and not by their own reading alone.
 template <class S, std::size_t N, class Cap>
-inline void add_other_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q, const Context<S, N>& context,
-                            std::array<S, N>& yield) {
+inline void add_other_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+                            const Context<S, N>& context, std::array<S, N>& yield) {
   for (std::size_t k = 0; k < model.other_count(); ++k) {
     const Term<S>& term = model.other_term(k);
     yield[term.place.body - 1U] += term.coefficient * plain_basis_value(model, term, context, q);
@@ -507,9 +507,9 @@ constexpr int most_yield_steps = 6;
 /// When a double or a float is accurate enough; squares of rad.
 template <class S>
 struct Enough {
-  static constexpr S correction = S(1e-8);        ///< the next one is a third-order rest of it
-  static constexpr S refinement = S(1e-19);       ///< square of what the next refinement would be
-  static constexpr S yield_step = S(1e-20);  ///< square of what the next evaluation would change
+  static constexpr S correction = S(1e-8);   ///< the next one is a third-order rest of it
+  static constexpr S refinement = S(2e-20);  ///< square of what the next refinement would be
+  static constexpr S yield_step = S(6e-20);  ///< square of what the next evaluation would change
 };
 template <>
 struct Enough<float> {
@@ -574,7 +574,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
         loaded_yield(model, q, angle, load, yield);
       }
     }
-    const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y, aim.tool_point.z - point.z};
+    const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y,
+                             aim.tool_point.z - point.z};
     Triple<S> turn;
     rotation_error(aim.flange.axes, flange.axes, turn);
     const S largest_turn = largest * allowed_turn<S>(k);
@@ -591,7 +592,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
       // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
       // order of the motion with it.
       motion(joints, point, dq, move);
-      const Triple<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y, shift.z - move.linear.z};
+      const Triple<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y,
+                                    shift.z - move.linear.z};
       const Triple<S> turn_left = {turn.x - move.angular.x, turn.y - move.angular.y, turn.z - move.angular.z};
       std::array<S, N> rest;
       const S left = corrector.solve(shift_left, turn_left, largest, largest_turn, rest);
@@ -691,7 +693,8 @@ inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, co
       for (std::size_t i = 0; i < N; ++i)
         corrector.joints()[i] = {triple<S>(ws.frames.axis(i, 2)), triple<S>(ws.frames.origin[i])};
       const Triple<S> tool = triple<S>(model.tool_pose().position);
-      corrector.set(triple<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool), settings);
+      corrector.set(triple<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool),
+                    settings);
     }
     std::array<S, N> dq;
     corrector.solve(position, orientation, largest, largest * allowed_turn<S>(k), dq);

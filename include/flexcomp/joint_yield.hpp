@@ -158,42 +158,51 @@ struct Local {
   S value, slope, half_curvature;
 };
 
-/// The cubic of the cell in which the reading lies (curve_weights() of forward.hpp in powers of the distance).
+/// Adds k times the cubic of the cell in which the reading lies (curve_weights() of forward.hpp in powers of the
+/// distance).
 template <class S, std::size_t N, class Cap>
-inline Local<S> local_curve(const Model<S, N, Cap>& model, const Term<S>& term, const S& q) {
+inline void add_local_curve(const Model<S, N, Cap>& model, const Term<S>& term, const S& q, const S& k,
+                            Local<S>& sum) {
   const Table& table = model.table(term.table);
-  const S* c = model.values(table);
   const std::int32_t m = table.size;
   const S per_rad = S(static_cast<float>(table.size)) * S(0.15915494309189533577);
   const S t = q * per_rad;
-  std::int32_t k = 0;
-  // As in curve_weights(): far inside 32 bits, and a NaN gives k = 0.
-  if (t > S(-1e7F) && t < S(1e7F)) k = truncate(t);
-  S u = t - S(static_cast<float>(k));
+  std::int32_t cell = 0;
+  // As in curve_weights(): far inside 32 bits, and a NaN gives cell 0.
+  if (t * t < S(1e14F)) cell = truncate(t);
+  S u = t - S(static_cast<float>(cell));
   if (u < S(0)) {
     u += S(1);
-    --k;
+    --cell;
   }
-  std::int32_t first = (k - 1) % m;
+  std::int32_t first = (cell - 1) % m;
   if (first < 0) first += m;
-  S c0 = c[first], c1, c2, c3;
+  const S* from = model.values(table) + first;
+  S c0 = from[0], c1, c2, c3;
   if (first + 3 < m) {
-    c1 = c[first + 1];
-    c2 = c[first + 2];
-    c3 = c[first + 3];
+    c1 = from[1];
+    c2 = from[2];
+    c3 = from[3];
   } else {
-    c1 = c[(first + 1) % m];
-    c2 = c[(first + 2) % m];
-    c3 = c[(first + 3) % m];
+    c1 = from[first + 1 < m ? 1 : 1 - m];
+    c2 = from[first + 2 < m ? 2 : 2 - m];
+    c3 = from[3 - m];
   }
-  const S middle = c1 + c1;
-  const S p2 = (c0 - middle + c2) * S(0.5);
+  // p0 + p1 u + p2 u^2 + p3 u^3
+  S p3 = (c1 - c2) * S(0.5);
+  p3 += (c3 - c0) * S(1.0 / 6);
+  S p2 = (c0 + c2) * S(0.5);
+  p2 -= c1;
   const S p1 = (c2 - c0) * S(0.5);
-  const S p0 = (c0 + middle + middle + c2) * S(1.0 / 6);
-  const S p3 = (c3 - c0) * S(1.0 / 6) + (c1 - c2) * S(0.5);
-  const S k3 = p3 * u;
-  const S bend = p2 + k3 + k3 + k3;  // half the second derivative
-  return {p0 + u * (p1 + u * (p2 + k3)), (p1 + u * (bend + p2)) * per_rad, bend * per_rad * per_rad};
+  S p0 = p2 * S(1.0 / 3);
+  p0 += c1;
+  const S bend = u * p3;
+  const S half = p2 + bend + bend + bend;  // of the second derivative
+  const S value = p1 + u * (p2 + bend);
+  sum.value += k * (p0 + u * value);
+  const S scale = k * per_rad;
+  sum.slope += scale * (p1 + u * (p2 + half));
+  sum.half_curvature += scale * per_rad * half;
 }
 
 /// Adds what levers and other loaded terms do, once the torques are known; lever(joint, far) gives a lever.
@@ -223,7 +232,9 @@ FLEXCOMP_ONCE void add_other_loaded(const Model<S, N, Cap>& model, const std::ar
     if (term.basis == Basis::load_torque_cubed) {
       value *= torque * torque;
     } else if (term.basis == Basis::curve) {
-      value *= local_curve(model, term, q[term.joint]).value;
+      Local<S> at = {S(0), S(0), S(0)};
+      add_local_curve(model, term, q[term.joint], S(1), at);
+      value *= at.value;
     }
     delta[term.place.body - 1U] += value;
   }
@@ -246,7 +257,8 @@ FLEXCOMP_ONCE void loaded_yield(const Model<S, N, Cap>& model, const std::array<
   if (load.has_force) add_force_torques(model, angle, load, loads.torque, delta);
   add_levers(
       model,
-      [&](std::size_t joint, std::size_t far) { return carried_lever(model, angle, loads, joint, far); }, delta);
+      [&](std::size_t joint, std::size_t far) { return carried_lever(model, angle, loads, joint, far); },
+      delta);
   if (model.other_loaded_count() != 0) add_other_loaded(model, q, loads.torque, delta);
 }
 
@@ -258,8 +270,9 @@ template <class S, std::size_t N>
 class YieldAround {
  public:
   template <class Cap>
-  void set(const Model<S, N, Cap>& model, const std::array<S, N>& q, const std::array<JointAxis<S>, N>& joints,
-           const FlangePose<S>& flange, const CarriedLoad<S>& load, std::array<S, N>& delta) {
+  void set(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+           const std::array<JointAxis<S>, N>& joints, const FlangePose<S>& flange, const CarriedLoad<S>& load,
+           std::array<S, N>& delta) {
     const S weight = load.gravity.z * load.mass_kg;
     weight_ = weight;
     const ThreeTriples<S>& f = flange.axes;
@@ -307,8 +320,8 @@ class YieldAround {
 
   /// By how much the yield changes (rad) when the joints turn by `by`.
   template <class Cap>
-  void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints, const std::array<S, N>& by,
-              std::array<S, N>& delta) const {
+  void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints,
+              const std::array<S, N>& by, std::array<S, N>& delta) const {
     // The arm's z is what the weight turns a joint by; outer joints move its end, inner ones turn it as a whole.
     S ux = S(0), uy = S(0);
     for (std::size_t i = N; i-- > 0;) {
@@ -349,7 +362,8 @@ class YieldAround {
   static constexpr std::size_t most_levers = 4;
 
   std::array<Planar, N> arm_;  ///< x, y of axis x (centre of mass - origin)
-  std::array<Planar, most_levers> lever_;  ///< x, y of axis x (far - near) as a unit vector; its z is the lever
+  std::array<Planar, most_levers>
+      lever_;  ///< x, y of axis x (far - near) as a unit vector; its z is the lever
   std::size_t levers_;
   S weight_;
 };
@@ -362,10 +376,7 @@ inline void add_own_yield(const Model<S, N, Cap>& model, const Term<S>& term, co
   if (term.basis == Basis::curve) {
     if (term.factor == Factor::temperature) k *= context.temperature_c - model.reference_temperature();
     if (term.factor == Factor::payload) k *= context.payload_kg;
-    const Local<S> at = local_curve(model, term, q);
-    sum.value += k * at.value;
-    sum.slope += k * at.slope;
-    sum.half_curvature += k * at.half_curvature;
+    add_local_curve(model, term, q, k, sum);
   } else if (term.basis == Basis::reading) {
     sum.value += k * q;
     sum.slope += k;

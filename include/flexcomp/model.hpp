@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
@@ -289,7 +290,7 @@ class Model {
   std::size_t other_count() const { return group_end_[other] - group_end_[own]; }
   const Term<S>& other_term(std::size_t k) const { return effects_[order_[group_end_[own] + k]]; }
   bool has_axial_gravity() const { return axial_gravity_; }  ///< along z of F0
-  S inverse_gravity() const { return inverse_gravity_; }  ///< s^2/m; 0 without gravity
+  S inverse_gravity() const { return inverse_gravity_; }     ///< s^2/m; 0 without gravity
   bool turns_tool() const { return turns_tool_; }
   /// Nominal tool rotation times the inverse of the one with constant terms.
   const Matrix3<S>& tool_turn() const { return tool_turn_; }
@@ -308,8 +309,16 @@ class Model {
                                       tables_[t.table].column_covariate == Covariate::direction);
   }
 
-  enum Group : std::uint8_t { lever = 0, other_loaded = 1, own = 2, other = 3, groups = 4, summed = 5, none = 6 };
-  static_assert(Cap::terms <= 255, "effects are counted in bytes");
+  enum Group : std::uint8_t {
+    lever = 0,
+    other_loaded = 1,
+    own = 2,
+    other = 3,
+    groups = 4,
+    summed = 5,
+    none = 6
+  };
+  using Count = std::conditional_t<Cap::terms <= 255, std::uint8_t, std::uint16_t>;
 
   /// Where the control cycle finds a term; only_joints_yield_ becomes false for one that it finds nowhere.
   Group group_of(const Term<S>& t) {
@@ -360,17 +369,19 @@ class Model {
         std::size_t at = n++;
         // Equal levers side by side, so that each is taken once.
         if (g == lever) {
-          for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at) order_[at] = order_[at - 1];
+          for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at)
+            order_[at] = order_[at - 1];
         }
-        order_[at] = static_cast<std::uint8_t>(k);
+        order_[at] = static_cast<Count>(k);
       }
-      group_end_[g] = static_cast<std::uint8_t>(n);
+      group_end_[g] = static_cast<Count>(n);
     }
     yields_to_loads_ = summed_any || group_end_[other_loaded] != 0;
     const S g2 = dot<S>(gravity_, gravity_);
     using std::sqrt;
     inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);
-    turns_tool_ = tool_moves_ || !is_zero(tool_[slot::rx]) || !is_zero(tool_[slot::ry]) || !is_zero(tool_[slot::rz]);
+    turns_tool_ =
+        tool_moves_ || !is_zero(tool_[slot::rx]) || !is_zero(tool_[slot::ry]) || !is_zero(tool_[slot::rz]);
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c) {
         tool_turn_(r, c) = nominal_tool_.rotation(r, 0) * tool_pose_.rotation(c, 0) +
@@ -384,7 +395,8 @@ class Model {
     const Matrix3<S>& r = from.rotation;
     const Triple<S> shift = triple<S>(to.position) - triple<S>(from.position);
     const auto into = [&r](const Triple<S>& v) {
-      return Triple<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z, r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
+      return Triple<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z,
+                       r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
                        r(0, 2) * v.x + r(1, 2) * v.y + r(2, 2) * v.z};
     };
     Triple<S> turn = {S(0), S(0), S(0)};
@@ -416,7 +428,8 @@ class Model {
     const ThreeTriples<S> turned = columns_of(nominal_tool_.rotation);
     const Triple<S> angular = combine(turned, tool.angular);
     Twist<S>& last = link_twist_[N - 1];
-    last.linear = last.linear + combine(turned, tool.linear) + cross(triple<S>(nominal_tool_.position), angular);
+    last.linear =
+        last.linear + combine(turned, tool.linear) + cross(triple<S>(nominal_tool_.position), angular);
     last.angular = last.angular + angular;
     base_twist_ = twist_between(Pose<S>(), base_pose_);
   }
@@ -461,8 +474,8 @@ class Model {
   std::array<Twist<S>, N> link_twist_{};
   Twist<S> base_twist_{};
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
-  std::array<std::uint8_t, groups> group_end_{};
-  std::array<std::uint8_t, Cap::terms> order_{};
+  std::array<Count, groups> group_end_{};
+  std::array<Count, Cap::terms> order_{};
   std::size_t effect_count_ = 0;
   std::size_t table_count_ = 0;
   std::size_t value_count_ = 0;

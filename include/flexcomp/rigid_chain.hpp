@@ -104,7 +104,8 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
 /// How the constant terms move the flange of the nominal chain, to first order: twists carried from the flange to F0,
 /// where the motion is given at the origin. `angle` as in the nominal rigid_pass().
 template <class S, std::size_t N, class Cap>
-inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle, Twist<S>& out) {
+inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
+                           Twist<S>& out) {
   S vx = S(0), vy = S(0), vz = S(0);
   S wx = S(0), wy = S(0), wz = S(0);
   for (std::size_t i = N; i-- > 0;) {

@@ -24,11 +24,11 @@ struct SinCos {
 
 namespace detail {
 
-/// Nearest integer of t, |t| < 65000, or of two nearly equal ones either. No libm call, no rounding mode: the shift
-/// makes it a matter of truncation.
-inline std::int32_t nearest(double t) { return static_cast<std::int32_t>(t + 65536.5) - 65536; }
-/// The same for |t| < 8000; the shift loses the last 10 bits, so up to 1/2048 beyond the half.
-inline std::int32_t nearest(float t) { return static_cast<std::int32_t>(t + 8192.5F) - 8192; }
+/// Nearest integer of t, |t| < 2^30; ties away from zero. No libm call, no rounding mode.
+template <class S>
+inline std::int32_t nearest(S t) {
+  return static_cast<std::int32_t>(t < S(0) ? t - S(0.5) : t + S(0.5));
+}
 
 /// Rotates (s, c) of the reduced angle by n quarter turns.
 template <class S>

@@ -61,8 +61,8 @@ inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t
     tables[j].offset = static_cast<std::uint16_t>(j * curve_values);
     tables[j].size = curve_values;
   }
-  const flexcomp::TermList<Scalar> list{terms.data(),  paper_terms + curves, tables.data(),
-                                        curves,        values.data(),        curves * curve_values};
+  const flexcomp::TermList<Scalar> list{terms.data(), paper_terms + curves, tables.data(),
+                                        curves,       values.data(),        curves * curve_values};
   const flexcomp::NominalRobot<6> robot = selftest::tx60l();
   flexcomp::ImageHeader header;
   header.sequence = 1;
@@ -92,7 +92,8 @@ inline flexcomp_robot c_robot() {
   flexcomp_robot_default(&c);
   c.name = selftest::robot_name;
   for (std::size_t i = 0; i < 6; ++i) {
-    c.links[i] = {r.links[i].theta_rad, r.links[i].d_m, r.links[i].a_m, r.links[i].alpha_rad, r.links[i].beta_rad};
+    c.links[i] = {r.links[i].theta_rad, r.links[i].d_m, r.links[i].a_m, r.links[i].alpha_rad,
+                  r.links[i].beta_rad};
     c.min_rad[i] = r.limits[i].min_rad;
     c.max_rad[i] = r.limits[i].max_rad;
   }

@@ -41,8 +41,9 @@ constexpr std::uint32_t ticks_per_10_instructions = 10;
 
 /// Instructions between two readings, to the nearest; the reading's own are in it (take an empty pair away).
 inline std::uint32_t instructions(std::uint32_t from, std::uint32_t to) {
-  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(to - from) * 10U + ticks_per_10_instructions / 2U) /
-                                    ticks_per_10_instructions);
+  return static_cast<std::uint32_t>(
+      (static_cast<std::uint64_t>(to - from) * 10U + ticks_per_10_instructions / 2U) /
+      ticks_per_10_instructions);
 }
 
 }  // namespace flexcomp::boards

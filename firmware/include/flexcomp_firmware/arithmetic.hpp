@@ -11,8 +11,9 @@ namespace flexcomp {
 namespace firmware {
 
 /// compensate() of the core.
-void corrected_command(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
-                       const CompensationSettings<Scalar>& settings, Compensated<Scalar, joints>& out);
+void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
+                       const FirmwareContext& context, const CompensationSettings<Scalar>& settings,
+                       Compensated<Scalar, joints>& out);
 
 /// What the flexible arm at q_rad still misses of the pose that the nominal arm has at q_command_rad.
 struct Miss {
