@@ -1,3 +1,4 @@
+# shellcheck shell=bash disable=SC2034
 # What the tests with the emulated Cortex-R5F have in common; sourced.
 set -eu
 : "${FLEXCOMP_SOURCE_DIR:?}" "${FLEXCOMP_IMAGE:?}" "${FLEXCOMP_BIN_DIR:?}"
