@@ -1,11 +1,15 @@
 /* A controller with flexcomp in it, as a CANopen node: the smallest complete program. It corrects the joint
  * commands of a Staubli TX60L a thousand times a second and takes new parameter sets over CAN meanwhile.
  *
- * One loop does all. It looks at the clock before anything else, and between two looks it makes at most one
- * call into the library for the bus or the store. So bus traffic, however dense, delays a cycle by no more than
- * the longest of these calls, which is the check of a complete parameter set at its commit. Where your processor
- * has a timer interrupt, control_cycle() belongs into it and nothing delays it: flexcomp_step() may interrupt
- * everything else here at any point (flexcomp.h, "Threads"). The emulated Cortex-R5F has no interrupts that work. */
+ * One loop does all. It looks at the clock before anything else, and between two looks it makes at most one call
+ * into the library for the bus or the store. Bus traffic, however dense, therefore delays a cycle by no more than
+ * the longest of these calls. Counted on an emulated Cortex-R5F, in instructions: a frame 9,000, a probe 45,000 (a
+ * cycle: 26,000), a piece of a slot 6,000; but 540,000 where a whole set is checked, at its commit and at a
+ * rollback. At 500 MHz that is about a millisecond: a push may cost this loop a cycle, which it leaves out.
+ *
+ * Where your processor has a timer interrupt, control_cycle() belongs into it, and nothing delays it at all:
+ * flexcomp_step() may interrupt everything else here at any point (flexcomp.h, "Threads"). It is polled here
+ * because interrupts of the emulated Cortex-R5F were not seen to work. */
 #include <flexcomp.h>
 
 #include "canopen_board.h"
