@@ -3,9 +3,10 @@
  *
  * One loop does all. It looks at the clock before anything else, and between two looks it makes at most one call
  * into the library for the bus or the store. Bus traffic, however dense, therefore delays a cycle by no more than
- * the longest of these calls. Counted on an emulated Cortex-R5F, in instructions: a frame 9,000, a probe 45,000 (a
- * cycle: 26,000), a piece of a slot 6,000; but 540,000 where a whole set is checked, at its commit and at a
- * rollback. At 500 MHz that is about a millisecond: a push may cost this loop a cycle, which it leaves out.
+ * the longest of these calls. Most take no longer than a cycle itself (a frame, a piece of a slot) or two (a
+ * probe); but a whole set is checked in one call, at its commit and at a rollback, which takes as long as about
+ * twenty cycles: half a million instructions, a millisecond at 500 MHz. A push may thus cost this loop a cycle,
+ * which it leaves out.
  *
  * Where your processor has a timer interrupt, control_cycle() belongs into it, and nothing delays it at all:
  * flexcomp_step() may interrupt everything else here at any point (flexcomp.h, "Threads"). It is polled here
