@@ -487,8 +487,10 @@ class HandMadeSdo:
 
     def ask(self, request):
         import can
+        while self.bus.recv(0) is not None:  # what others have asked since
+            pass
         self.bus.send(can.Message(arbitration_id=0x600 + NODE, data=request, is_extended_id=False))
-        end = time.monotonic() + 2
+        end = time.monotonic() + SLACK
         while time.monotonic() < end:
             message = self.bus.recv(0.5)
             if message is not None and message.arbitration_id == 0x580 + NODE:
