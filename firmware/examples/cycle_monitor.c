@@ -1,7 +1,8 @@
 #include "cycle_monitor.h"
 
-/* What a cycle was: without a set, with one, fading from one to the next, fading out to none. Those of which the
- * outside cannot tell on which side of a change they were are kept apart. */
+/* What a cycle was: without a set, with one, fading from one to the next, fading out to none. Kept apart are those
+ * that took another set over, which costs them some instructions once, and those beside them of which the outside
+ * cannot tell on which side of the change they were. */
 enum { NO_SET, ACTIVE, FADING, FADING_OUT, CHANGING, CLASSES };
 static const char* const class_names[CLASSES] = {"no_set", "active", "fading", "fading_out", "changing"};
 
@@ -67,7 +68,7 @@ static int class_of(const sample* s) {
   const int32_t fade = (int32_t)fade_cycles_set;
   const int none = s->status == FLEXCOMP_NO_SET;
   if (since_last >= fade) return none ? NO_SET : ACTIVE;
-  if (since_last >= 0 && since_first < fade) return none ? FADING_OUT : FADING;
+  if (since_last > 0 && since_first < fade) return none ? FADING_OUT : FADING;
   return CHANGING;
 }
 

@@ -135,8 +135,9 @@ void board_send(unsigned line, const uint8_t* bytes, size_t size) {
   }
 }
 
-/* On a wire 1750 us above 19200 baud. Here bytes come from another process, in bursts. */
-uint32_t board_bus_gap_us(void) { return 50000; }
+/* On a wire 1750 us above 19200 baud. Here bytes come from another process of a machine that may have other things
+ * to do, so a pause within a frame says nothing. Below the second after which a client asks again. */
+uint32_t board_bus_gap_us(void) { return 500000; }
 
 /* --- slots --------------------------------------------------------------------------------------- */
 

@@ -6,5 +6,5 @@ here=$(dirname "$0")
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 /usr/bin/python3 "$here/../buses.py" prepare "$work"
-"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 240 \
+"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 200 \
   /usr/bin/python3 "$here/modbus_rtu.py" "$work"

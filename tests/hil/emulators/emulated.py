@@ -56,26 +56,31 @@ class Master:
         self.unit = unit
         self.bytes = 0
         self.answers = 0
+        self.repeated = 0
 
     def close(self):
         os.close(self.fd)
 
-    def ask(self, pdu):
+    def ask(self, pdu, attempts=5):
+        """The answer. A machine that is busy elsewhere may tear a frame by a pause in it; then it is asked again,
+        after a silence that is longer than the gap of the line."""
         frame = bytes([self.unit]) + pdu
         frame += crc16(frame)
-        os.write(self.fd, frame)
-        self.bytes += len(frame)
-        answer, length = b"", 5
-        end = time.monotonic() + PATIENCE
-        while len(answer) < length:
-            ready, _, _ = select.select([self.fd], [], [], 1)
-            check(ready or time.monotonic() < end, "an answer", pdu.hex(), answer.hex())
-            if ready:
-                answer += os.read(self.fd, 512)
-            if len(answer) >= 3 and not answer[1] & 0x80:
-                length = 5 + answer[2] if answer[1] in (3, 4, 0x17) else 8
+        for attempt in range(attempts):
+            os.write(self.fd, frame)
+            self.bytes += len(frame)
+            answer, length = b"", 5
+            end = time.monotonic() + PATIENCE / attempts
+            while len(answer) < length and time.monotonic() < end:
+                if select.select([self.fd], [], [], 1)[0]:
+                    answer += os.read(self.fd, 512)
+                if len(answer) >= 3 and not answer[1] & 0x80:
+                    length = 5 + answer[2] if answer[1] in (3, 4, 0x17) else 8
+            if answer:
+                break
+            self.repeated += 1
         check(len(answer) == length and answer[0] == self.unit and crc16(answer[:-2]) == answer[-2:],
-              "the answer is whole", answer.hex())
+              "the answer comes and is whole", pdu.hex(), answer.hex())
         self.bytes += length
         self.answers += 1
         return answer[1:-2]
