@@ -28,6 +28,7 @@ typedef struct figures {
   uint32_t late;
   uint32_t least_interval_ticks;
   uint32_t most_interval_ticks;
+  flexcomp_real command_rad[FLEXCOMP_JOINTS];
   flexcomp_real correction_rad[FLEXCOMP_JOINTS];
   step_figures steps[CLASSES][LOADS];
   correction_figures corrections[CLASSES];
@@ -116,6 +117,7 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status sta
     if (q_command_rad[j] < last_command_rad[j] || q_command_rad[j] > last_command_rad[j]) s->standing = 0;
     s->change_rad[j] = correction - kept.correction_rad[j];
     s->correction_rad[j] = correction;
+    kept.command_rad[j] = q_command_rad[j];
     kept.correction_rad[j] = correction;
     last_command_rad[j] = q_command_rad[j];
   }
@@ -205,7 +207,8 @@ size_t monitor_report(char* to, size_t size) {
   put_number(&t, ", \"late\": ", (int32_t)f.late);
   put_number(&t, ", \"interval_ticks\": [", (int32_t)f.least_interval_ticks);
   put_number(&t, ", ", (int32_t)f.most_interval_ticks);
-  put_angles(&t, "], \"correction_nrad\": ", f.correction_rad);
+  put_angles(&t, "], \"command_nrad\": ", f.command_rad);
+  put_angles(&t, ", \"correction_nrad\": ", f.correction_rad);
   for (int c = 0; c < CLASSES; ++c) {
     put(&t, ", \"");
     put(&t, class_names[c]);

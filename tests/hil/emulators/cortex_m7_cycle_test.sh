@@ -5,5 +5,5 @@ here=$(dirname "$0")
 . "$here/host_programs.sh"
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
-"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 200 --shift 4 \
+"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 270 --shift 4 \
   /usr/bin/python3 "$here/cycle.py" "$work" 4

@@ -6,7 +6,7 @@ here=$(dirname "$0")
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 /usr/bin/python3 "$here/../buses.py" prepare "$work"
-"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 200 \
+"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 270 \
   /usr/bin/python3 "$here/modbus_rtu.py" "$work"
 
 # The way a person starts it: it says where the line is, and nothing of it is left when it ends.
