@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced: leaves with ctest's "skipped" where a host program is missing.
 for program in flexcomp flexcomp-plant; do
   if ! [ -x "$FLEXCOMP_BIN_DIR/$program" ]; then
