@@ -1,4 +1,7 @@
 // Cortex-M: vector table and reset entry. The stack pointer comes from the table's first word.
+//
+// An image that has a SysTick or peripherals with interrupts defines flexcomp_board_systick() and
+// flexcomp_board_interrupt(); in every other image an interrupt is as unexpected as a fault.
 #include <cstdint>
 
 extern "C" {
@@ -13,9 +16,16 @@ extern std::uint32_t flexcomp_stack_top;
   flexcomp_board_start();
 }
 
+void flexcomp_board_systick();
+/// All interrupts of peripherals; which one it is stands in the processor's IPSR (16 + number).
+void flexcomp_board_interrupt();
+[[gnu::weak]] void flexcomp_board_systick() { flexcomp_board_fault(); }
+[[gnu::weak]] void flexcomp_board_interrupt() { flexcomp_board_fault(); }
+
 struct Vectors {
   const void* stack;
   void (*entry[15])();
+  void (*interrupt[32])();
 };
 // Only the processor reads it; the linker script keeps the section.
 extern const Vectors flexcomp_vectors;
@@ -23,5 +33,9 @@ extern const Vectors flexcomp_vectors;
     &flexcomp_stack_top,
     {flexcomp_reset, flexcomp_board_fault, flexcomp_board_fault, flexcomp_board_fault, flexcomp_board_fault,
      flexcomp_board_fault, nullptr, nullptr, nullptr, nullptr, flexcomp_board_fault, flexcomp_board_fault,
-     nullptr, flexcomp_board_fault, flexcomp_board_fault}};
+     nullptr, flexcomp_board_fault, flexcomp_board_systick},
+#define FOUR \
+  flexcomp_board_interrupt, flexcomp_board_interrupt, flexcomp_board_interrupt, flexcomp_board_interrupt
+    {FOUR, FOUR, FOUR, FOUR, FOUR, FOUR, FOUR, FOUR}};
+#undef FOUR
 }
