@@ -78,7 +78,8 @@ bool regular_poses(flexcomp_arm* arm) {
   static flexcomp::Model<Scalar, 6> model;
   const flexcomp::NominalRobot<6> robot = selftest::tx60l();
   const std::size_t size = flexcomp::load_u32(storage.bytes + FLEXCOMP_SLOT_BYTES - 32 + 4);
-  if (flexcomp::model_from_image<Scalar>(storage.bytes, size, robot, model) != flexcomp::Refusal::none) return false;
+  if (flexcomp::model_from_image<Scalar>(storage.bytes, size, robot, model) != flexcomp::Refusal::none)
+    return false;
   const flexcomp::Context<Scalar, 6> context = flexcomp::default_context<Scalar>(robot);
   budget::Commands commands(1);
   Scalar left = Scalar(0);
@@ -122,7 +123,8 @@ void image_check() {
   const flexcomp::Refusal refusal = flexcomp::check_image(storage.bytes, size, hash, robot.name_hash, header);
   const std::uint32_t to = ticks();
   if (refusal != flexcomp::Refusal::none) return;
-  print("image check, tenths per byte: ", instructions(from + own, to) * 10U / static_cast<std::uint32_t>(size), "\n");
+  print("image check, tenths per byte: ",
+        instructions(from + own, to) * 10U / static_cast<std::uint32_t>(size), "\n");
 }
 
 int frames_sent;
