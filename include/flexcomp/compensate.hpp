@@ -213,6 +213,8 @@ class Corrector {
 
   /// Whether any correction so far was damped or scaled down.
   bool gave_up() const { return gave_up_; }
+  /// Never above the square of the smallest singular value of either block (m^2, or 1 for orientation).
+  S regular() const { return regular_; }
   /// True where joints that turned by this sum of squares (rad^2) since set() have made the factored Jacobian a tenth
   /// wrong or more.
   bool is_worn_by(S square) const { return !(square <= S(0.01) * regular_); }
@@ -508,12 +510,14 @@ constexpr int most_yield_steps = 6;
 template <class S>
 struct Enough {
   static constexpr S correction = S(1e-8);   ///< the next one is a third-order rest of it
+  static constexpr S rough = S(1e-20);       ///< square of what a first solution leaves
   static constexpr S refinement = S(2e-20);  ///< square of what the next refinement would be
-  static constexpr S yield_step = S(6e-20);  ///< square of what the next evaluation would change
+  static constexpr S yield_step = S(2e-19);  ///< square of what the next evaluation would change
 };
 template <>
 struct Enough<float> {
   static constexpr float correction = 1e-6F;
+  static constexpr float rough = 2.5e-13F;
   static constexpr float refinement = 1e-14F;
   static constexpr float yield_step = 1e-14F;
 };
@@ -587,7 +591,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
       fresh = true;
     }
     S square = corrector.solve(shift, turn, largest, largest_turn, dq);
-    bool done = fresh;
+    // The factored Jacobian is off by about the turn over the smallest singular value, and the correction with it.
+    bool done = fresh || turned * square <= Enough<S>::rough * corrector.regular();
     for (int n = 0; n < most_refinements && !done; ++n) {
       // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
       // order of the motion with it.
@@ -642,6 +647,10 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
     }
   }
   S square = square_of(dq);
+  if (loaded && load.is_plain && model.other_count() == 0 && model.other_loaded_count() == 0) {
+    // What the change above leaves out is a wave's bend, of the wave's own size: for a float mostly nothing.
+    if (square_of(yield) * square * square <= Enough<S>::yield_step) return;
+  }
   for (int k = 0; k < most_yield_steps; ++k) {
     std::array<S, N> now;
     if (loaded) {
