@@ -166,7 +166,7 @@ Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& he
     if (r == Refusal::truncated || r == Refusal::bad_length) detail = header.total_bytes;
     return r;
   }
-  r = model_from_image(staging_.data(), size, robot_, model);
+  r = build_model(staging_.data(), size, robot_, model);
   if (r == Refusal::unknown_basis) {
     BasisFinder finder;
     visit_image<Scalar>(staging_.data(), size, finder);
