@@ -6,7 +6,7 @@
 #ifndef FLEXCOMP_SET_TX60L_H
 #define FLEXCOMP_SET_TX60L_H
 
-#include <stdint.h>
+#include <flexcomp.h>
 
 /* The image: a slot's first bytes. */
 static const uint8_t tx60l_image[1440] = {
@@ -60,7 +60,8 @@ static const uint8_t tx60l_image[1440] = {
 static const uint8_t tx60l_seal[32] = {
     70, 76, 88, 83, 160, 5, 0, 0, 7, 0, 0, 0, 17, 214, 173, 140, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 35, 193, 55, 164};
 
-static const double tx60l_command_rad[6] = {-1.5625, 0.9375, 0.78125, -1.875, 1.25, 3.125};
-static const double tx60l_corrected_rad[6] = {-1.5626017793935265, 0.93445231270673157, 0.78046663141301309, -1.8779254165260417, 1.2487171195540201, 3.1274530113466823};
+static const flexcomp_real tx60l_command_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5625, (flexcomp_real)0.9375, (flexcomp_real)0.78125, (flexcomp_real)-1.875, (flexcomp_real)1.25, (flexcomp_real)3.125};
+
+static const flexcomp_real tx60l_corrected_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5626017793935265, (flexcomp_real)0.93445231270673157, (flexcomp_real)0.78046663141301309, (flexcomp_real)-1.8779254165260417, (flexcomp_real)1.2487171195540201, (flexcomp_real)3.1274530113466823};
 
 #endif

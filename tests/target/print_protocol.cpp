@@ -66,18 +66,21 @@ int print_set(const selftest::Image& image, const protocol::Exchange& exchange) 
       " * Printed by tests/target/print_protocol.cpp; \"cmake --build --preset host --target golden\" writes "
       "it\n"
       " * anew. */\n/* clang-format off */\n"
-      "#ifndef FLEXCOMP_SET_TX60L_H\n#define FLEXCOMP_SET_TX60L_H\n\n#include <stdint.h>\n\n");
+      "#ifndef FLEXCOMP_SET_TX60L_H\n#define FLEXCOMP_SET_TX60L_H\n\n#include <flexcomp.h>\n\n");
   std::printf("/* The image: a slot's first bytes. */\n");
   print_bytes("static const uint8_t", "tx60l_image", image.data(), image.size());
   std::printf("\n/* The seal: a slot's last 32 bytes. */\n");
   constexpr std::size_t seal = 32;
   print_bytes("static const uint8_t", "tx60l_seal", exchange.slot(0).data() + FLEXCOMP_SLOT_BYTES - seal,
               seal);
-  std::printf("\nstatic const double tx60l_command_rad[6] = {");
-  for (std::size_t i = 0; i < 6; ++i) std::printf("%s%.17g", i == 0 ? "" : ", ", q[i]);
-  std::printf("};\nstatic const double tx60l_corrected_rad[6] = {");
-  for (std::size_t i = 0; i < 6; ++i) std::printf("%s%.17g", i == 0 ? "" : ", ", corrected.q[i]);
-  std::printf("};\n\n#endif\n");
+  const auto print_joints = [](const char* name, const std::array<double, 6>& joints) {
+    std::printf("\nstatic const flexcomp_real %s[FLEXCOMP_JOINTS] = {", name);
+    for (std::size_t i = 0; i < 6; ++i) std::printf("%s(flexcomp_real)%.17g", i == 0 ? "" : ", ", joints[i]);
+    std::printf("};\n");
+  };
+  print_joints("tx60l_command_rad", q);
+  print_joints("tx60l_corrected_rad", corrected.q);
+  std::printf("\n#endif\n");
   return 0;
 }
 
