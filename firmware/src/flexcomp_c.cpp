@@ -222,11 +222,8 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
   Arm& arm = arm_of(fc);
   fw::Joints q;
   for (std::size_t j = 0; j < fw::joints; ++j) q[j] = q_command_rad[j];
-  fw::StepResult result;
-  if (context == nullptr) {
-    result = arm.device.step(q, arm.context);
-  } else {
-    fw::FirmwareContext c;
+  fw::FirmwareContext c;
+  if (context != nullptr) {
     c.payload_kg = context->payload_kg;
     for (std::size_t k = 0; k < 3; ++k) {
       c.payload_com_m[k] = context->payload_com_m[k];
@@ -235,8 +232,8 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
     c.temperature_c = context->temperature_c;
     c.time_s = context->time_s;
     for (std::size_t j = 0; j < fw::joints; ++j) c.relative_speed[j] = context->relative_speed[j];
-    result = arm.device.step(q, c);
   }
+  const fw::StepResult result = arm.device.step(q, context != nullptr ? c : arm.context);
   for (std::size_t j = 0; j < fw::joints; ++j) q_corrected_rad[j] = result.q[j];
   return static_cast<flexcomp_status>(result.status);
 }
