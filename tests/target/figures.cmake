@@ -24,6 +24,15 @@ set_tests_properties(target/figures target/step_is_compiled_for_speed PROPERTIES
 add_custom_target(figures COMMAND ${figures} update ${figures_of} VERBATIM
   DEPENDS target_size_nothing target_size_core_store target_size_both_buses target_size_memory target_firmware_links)
 
+# The call graph's answer against a run.
+add_executable(target_stack stack_selftest.cpp)
+target_include_directories(target_stack PRIVATE "${PROJECT_SOURCE_DIR}/firmware")
+target_link_libraries(target_stack PRIVATE flexcomp_firmware flexcomp_target_warnings)
+flexcomp_link_image(target_stack)
+add_test(NAME target/stack_in_a_run COMMAND ${figures} run --build "${CMAKE_BINARY_DIR}" --tools "${tools}" --
+  ${CMAKE_CROSSCOMPILING_EMULATOR} $<TARGET_FILE:target_stack>)
+set_tests_properties(target/stack_in_a_run PROPERTIES TIMEOUT 60 LABELS target)
+
 set(why_big_frame "more than the 2560 bytes allowed")
 set(why_recursion "refused: recursion: sample -> .*other.* -> sample")
 set(why_pointer "refused: sample: calls through a pointer")
