@@ -18,6 +18,13 @@ set(figures ${Python3_EXECUTABLE} "${CMAKE_CURRENT_SOURCE_DIR}/figures.py")
 set(figures_of --doc "${PROJECT_SOURCE_DIR}/docs/targets.md" --target ${target} --build "${CMAKE_BINARY_DIR}"
   --tools "${tools}")
 add_test(NAME target/figures COMMAND ${figures} check ${figures_of})
+# The comparison itself: a table that promises less than is measured is refused.
+add_test(NAME target/figures_are_compared
+  COMMAND sh -c "sed 's/^| `stack poll` |.*/| `stack poll` | | 100 | 100 | 100 | |/' \"$2\" >wrong_table.md; shift 2; \"$@\""
+    sh --doc "${PROJECT_SOURCE_DIR}/docs/targets.md" ${figures} check --doc wrong_table.md --target ${target}
+    --build "${CMAKE_BINARY_DIR}" --tools "${tools}")
+set_tests_properties(target/figures_are_compared PROPERTIES TIMEOUT 60 LABELS target
+  PASS_REGULAR_EXPRESSION "stack poll +[0-9]+ documented 100 .*ABOVE what is documented")
 add_test(NAME target/step_is_compiled_for_speed
   COMMAND ${figures} speed --build "${CMAKE_BINARY_DIR}" --tools "${tools}")
 set_tests_properties(target/figures target/step_is_compiled_for_speed PROPERTIES TIMEOUT 60 LABELS target)

@@ -1,4 +1,5 @@
-/* Core and parameter store, no bus: a controller that is loaded by other means. Every call of such a controller. */
+/* Core and parameter store, no bus: a controller that is loaded by other means. Every call of such a
+ * controller but the texts for people. */
 #include "hooks.h"
 
 static flexcomp_memory memory;
