@@ -101,7 +101,7 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
 
 /// Largest magnitude in a list; NaNs are skipped.
 template <class S, std::size_t N>
-inline S greatest_of(const std::array<S, N>& v) {
+FLEXCOMP_ONCE S greatest_of(const std::array<S, N>& v) {
   S greatest = S(0);
   for (const S x : v) {
     if (x > greatest) greatest = x;
@@ -262,8 +262,8 @@ class Corrector {
   }
 
  private:
-  S solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest, S largest_turn,
-               std::array<S, N>& dq) {
+  FLEXCOMP_ONCE S solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest,
+                             S largest_turn, std::array<S, N>& dq) {
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) {
       dq[i] = dot(column_[i].origin, u);
@@ -274,7 +274,7 @@ class Corrector {
     for (std::size_t i = 0; i < N; ++i) dq[i] += turn[i];
     return square_of(dq);
   }
-  static bool hold_below(std::array<S, N>& v, S largest) {
+  FLEXCOMP_ONCE static bool hold_below(std::array<S, N>& v, S largest) {
     const S greatest = greatest_of(v);
     if (!(greatest > largest)) return false;
     const S scale = largest / greatest;
@@ -405,9 +405,12 @@ template <class S, std::size_t N, class Cap>
 inline void take_aim(const Model<S, N, Cap>& model, Aim<S>& aim) {
   ThreeTriples<S>& axes = aim.flange.axes;
   if (model.turns_tool()) {
-    const ThreeTriples<S> turn = columns_of(model.tool_turn());
     const ThreeTriples<S> nominal = axes;
-    axes = {combine(nominal, turn.a), combine(nominal, turn.b), combine(nominal, turn.c)};
+    int k = 0;
+    for (Triple<S>* v : {&axes.a, &axes.b, &axes.c}) {
+      const Triple<S> turn = triple<S>(model.tool_turn().col(k++));
+      *v = combine(nominal, turn);
+    }
   }
   if (!model.has_base()) return;
   const Vector3<S>& p = model.base_pose().position;
