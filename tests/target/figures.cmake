@@ -31,6 +31,23 @@ set_tests_properties(target/figures target/step_is_compiled_for_speed PROPERTIES
 add_custom_target(figures COMMAND ${figures} update ${figures_of} VERBATIM
   DEPENDS target_size_nothing target_size_core_store target_size_both_buses target_size_memory target_firmware_links)
 
+# The instruction budget, counted in the emulator: an instruction takes 1024 ns there, so that the board's clock counts
+# it to the nearest (the bare Cortex-R5F counts at 1 ns as it is started anyway).
+string(REPLACE "shift=2" "shift=10" counting "${CMAKE_CROSSCOMPILING_EMULATOR}")
+set(instructions_of --doc "${PROJECT_SOURCE_DIR}/docs/targets.md" --target ${target} -- ${counting}
+  $<TARGET_FILE:budget_parts>)
+add_test(NAME target/instructions COMMAND ${figures} instructions check ${instructions_of})
+add_test(NAME target/instructions_are_compared
+  COMMAND sh -c "sed 's/^| `SDO request .*/| `SDO request (expedited upload)` | | 100 | 100 | 100 | |/' \"$1\" >wrong_instructions.md; shift; \"$@\""
+    sh "${PROJECT_SOURCE_DIR}/docs/targets.md" ${figures} instructions check --doc wrong_instructions.md
+    --target ${target} -- ${counting} $<TARGET_FILE:budget_parts>)
+set_tests_properties(target/instructions target/instructions_are_compared PROPERTIES TIMEOUT 60 LABELS target)
+set_tests_properties(target/instructions_are_compared PROPERTIES
+  PASS_REGULAR_EXPRESSION "SDO request .* documented 100 .*ABOVE what is documented")
+add_test(NAME target/budget COMMAND ${counting} $<TARGET_FILE:budget>)
+set_tests_properties(target/budget PROPERTIES TIMEOUT 60 LABELS target)
+add_custom_target(instructions COMMAND ${figures} instructions update ${instructions_of} VERBATIM)
+
 # The call graph's answer against a run.
 add_executable(target_stack stack_selftest.cpp)
 target_include_directories(target_stack PRIVATE "${PROJECT_SOURCE_DIR}/firmware")

@@ -223,9 +223,9 @@ def speed(args):
     return 1 if shared else 0
 
 
-def read_table(text):
-    """Lines of the table, its header, and its rows by name."""
-    begin, end = text.index(BEGIN), text.index(END)
+def read_table(text, name="figures"):
+    """The header of a table of the document, and its rows by name."""
+    begin, end = text.index(f"<!-- {name} -->"), text.index(f"<!-- end of {name} -->")
     lines = [line for line in text[begin:end].splitlines() if line.startswith("|")]
     cells = lambda line: [c.strip() for c in line.strip().strip("|").split("|")]
     return cells(lines[0]), {cells(line)[0].strip("`"): cells(line) for line in lines[2:]}
@@ -235,9 +235,9 @@ def number(cell):
     return int(cell.replace(",", "")) if re.fullmatch(r"[\d,]+", cell) else None
 
 
-def check(args):
-    figures, _ = measure(args.build, args.tools)
-    header, rows = read_table(pathlib.Path(args.doc).read_text())
+def compare(args, figures, table, target_name):
+    """Against the document: 1 where a figure has grown by more than 2 % or is above its limit."""
+    header, rows = read_table(pathlib.Path(args.doc).read_text(), table)
     column, goal = header.index(args.target), header.index("at most")
     bad = 0
     for name, value in figures.items():
@@ -254,18 +254,17 @@ def check(args):
         elif value < documented * 0.9:
             verdict = "ok (far below: the table could be written anew)"
         bad += not verdict.startswith("ok")
-        print(f"{name:24} {value:7} documented {documented} at most {limit}: {verdict}")
+        print(f"{name:40} {value:7} documented {documented} at most {limit}: {verdict}")
     if bad:
-        print(f"{bad} figures are not as {args.doc} says; \"cmake --build --preset {args.target} --target figures\""
+        print(f"{bad} figures are not as {args.doc} says; \"cmake --build --preset {args.target} --target {target_name}\""
               " writes them anew")
     return 1 if bad else 0
 
 
-def update(args):
-    figures, ways = measure(args.build, args.tools)
+def write(args, figures, table):
     doc = pathlib.Path(args.doc)
     text = doc.read_text()
-    header, rows = read_table(text)
+    header, rows = read_table(text, table)
     column = header.index(args.target)
     missing = [name for name in figures if name not in rows]
     if missing:
@@ -277,9 +276,34 @@ def update(args):
         old = re.compile(r"^\|\s*`" + re.escape(name) + r"`\s*\|.*$", re.M)
         text = old.sub("| " + " | ".join(cells) + " |", text, count=1)
     doc.write_text(text)
+    return 0
+
+
+def check(args):
+    figures, _ = measure(args.build, args.tools)
+    return compare(args, figures, "figures", "figures")
+
+
+def update(args):
+    figures, ways = measure(args.build, args.tools)
+    if write(args, figures, "figures"):
+        return 1
     for entry, way in ways.items():
         print(f"flexcomp_{entry}: " + " > ".join(way))
     return 0
+
+
+def instructions(args):
+    """What budget_parts.elf prints: one "name: count" a line."""
+    run = subprocess.run(args.command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                         text=True)
+    figures = {m[1]: int(m[2]) for m in re.finditer(r"^(.+): (\d+)$", run.stdout, re.M)}
+    if run.returncode != 0 or len(figures) < 10:
+        print(run.stdout)
+        raise Refused(f"the image ended with status {run.returncode}")
+    if args.what == "update":
+        return write(args, figures, "instructions")
+    return compare(args, figures, "instructions", "instructions")
 
 
 def stack(args):
@@ -311,6 +335,12 @@ def main():
         command.add_argument(option, required=True)
     command.add_argument("command", nargs="+")
     command.set_defaults(run=in_a_run)
+    command = commands.add_parser("instructions")
+    command.add_argument("what", choices=("check", "update"))
+    for option in ("--doc", "--target"):
+        command.add_argument(option, required=True)
+    command.add_argument("command", nargs="+")
+    command.set_defaults(run=instructions)
     command = commands.add_parser("stack")
     command.add_argument("--ci", action="append", required=True)
     command.add_argument("--entry", required=True)
