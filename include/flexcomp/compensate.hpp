@@ -509,19 +509,22 @@ constexpr int most_refinements = 3;
 /// Evaluations of the yield after the first at most. Each leaves its slope, some 1e-3 on a stiff arm, of the one before.
 constexpr int most_yield_steps = 6;
 
-/// When a double or a float is accurate enough; squares of rad.
+/// When a double or a float is accurate enough; squares of rad. `rough` and `bend` are estimates, good enough for a float
+/// to leave something out; a double shows it always.
 template <class S>
 struct Enough {
-  static constexpr S correction = S(1e-8);   ///< the next one is a third-order rest of it
-  static constexpr S rough = S(1e-20);       ///< square of what a first solution leaves
-  static constexpr S refinement = S(2e-20);  ///< square of what the next refinement would be
-  static constexpr S yield_step = S(2e-19);  ///< square of what the next evaluation would change
+  static constexpr S correction = S(1e-8);   ///< of the chain: the next one is a third-order rest of it
+  static constexpr S rough = S(0);           ///< what a first solution of the linear problem leaves
+  static constexpr S refinement = S(2e-20);  ///< what the next refinement would be
+  static constexpr S bend = S(0);            ///< what the yield beside the chain leaves out
+  static constexpr S yield_step = S(6e-20);  ///< what the next evaluation of the yield would change
 };
 template <>
 struct Enough<float> {
   static constexpr float correction = 1e-6F;
   static constexpr float rough = 2.5e-13F;
   static constexpr float refinement = 1e-14F;
+  static constexpr float bend = 1e-14F;
   static constexpr float yield_step = 1e-14F;
 };
 
@@ -569,7 +572,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
   FlangePose<S> flange;
   YieldAround<S, N> around;
   bool fresh = false;
-  for (int k = 1;; ++k) {
+  int k = 1;
+  for (;; ++k) {
     rigid_pass(model.shapes(), angle, joints, flange);
     Triple<S> point;
     flange_point(flange, model.tool_pose().position, point);
@@ -650,11 +654,11 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
     }
   }
   S square = square_of(dq);
-  if (loaded && load.is_plain && model.other_count() == 0 && model.other_loaded_count() == 0) {
-    // What the change above leaves out is a wave's bend, of the wave's own size: for a float mostly nothing.
-    if (square_of(yield) * square * square <= Enough<S>::yield_step) return;
+  if (loaded && load.is_plain && k == 1 && model.other_count() == 0 && model.other_loaded_count() == 0) {
+    // From this one chain the change above leaves out a wave's bend, of the wave's own size.
+    if (square_of(yield) * square * square <= Enough<S>::bend) return;
   }
-  for (int k = 0; k < most_yield_steps; ++k) {
+  for (int n = 0; n < most_yield_steps; ++n) {
     std::array<S, N> now;
     if (loaded) {
       rotate_all(angle, dq, square);
@@ -730,14 +734,15 @@ template <class S, std::size_t N, class Cap>
 inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
                        const Context<S, N>& context, const CompensationSettings<S>& settings,
                        Compensated<S, N>& out) {
-  out.status = StepStatus::refused;
-  FLEXCOMP_UNROLL
-  for (std::size_t i = 0; i < N; ++i) out.q[i] = q_command[i];
+  const auto refuse = [&out, &q_command] {
+    out.q = q_command;
+    out.status = StepStatus::refused;
+  };
   for (std::size_t i = 0; i < N; ++i) {
-    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return;
+    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return refuse();
   }
   // Asked here because a table holds its end values outside its nodes and would hide a NaN.
-  if (!detail::is_finite_context(context)) return;
+  if (!detail::is_finite_context(context)) return refuse();
   const S largest = settings.largest_correction_rad;
   std::array<SinCos<S>, N> angle;
   detail::sin_cos_all(q_command, model.nominals(), angle);
@@ -762,7 +767,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
     const S change = q[i] - q_command[i];
     square += change * change;
   }
-  if (!(square < S(1e8))) return;
+  if (!(square < S(1e8))) return refuse();
   out.status = corrector.gave_up() ? StepStatus::near_singular : StepStatus::ok;
   if (square > largest * largest) {
     std::array<S, N> change;

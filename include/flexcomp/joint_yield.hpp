@@ -39,8 +39,8 @@ inline void carried_load(const Model<S, N, Cap>& model, const Context<S, N>& con
   load.com_m = {context.payload_com_m[0] + edit[slot::com_x], context.payload_com_m[1] + edit[slot::com_y],
                 context.payload_com_m[2] + edit[slot::com_z]};
   load.force_n = {context.force_n[0], context.force_n[1], context.force_n[2]};
-  load.has_force = load.force_n.x < S(0) || load.force_n.x > S(0) || load.force_n.y < S(0) ||
-                   load.force_n.y > S(0) || load.force_n.z < S(0) || load.force_n.z > S(0);
+  const Triple<S>& f = load.force_n;
+  load.has_force = f.x * f.x + f.y * f.y + f.z * f.z > S(0);
   load.is_plain = !load.has_force && model.has_axial_gravity();
 }
 

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "flexcomp.h"
+#include "flexcomp/forward.hpp"
 #include "flexcomp/image.hpp"
 #include "selftest.hpp"
 
@@ -134,5 +135,35 @@ class Commands {
  private:
   std::uint32_t state_;
 };
+
+/// True where the smallest singular value of the Jacobian (m, rad) at the tool point of the nominal arm is at least
+/// 0.1: where J J^T - 0.01 has a Cholesky factor.
+template <class Model>
+inline bool is_regular(const Model& model, const std::array<Scalar, 6>& q) {
+  std::array<flexcomp::SinCos<Scalar>, 6> reading;
+  for (std::size_t i = 0; i < 6; ++i) reading[i] = flexcomp::sin_cos(q[i]);
+  flexcomp::Frames<Scalar, 6> frames;
+  flexcomp::detail::nominal_pass(model, reading, frames);
+  const flexcomp::Pose<Scalar> tool =
+      flexcomp::Pose<Scalar>{frames.rotation[6], frames.origin[6]} * model.nominal_tool();
+  Scalar a[6][6] = {};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const flexcomp::Vector3<Scalar> z = frames.axis(i, 2);
+    const flexcomp::Vector3<Scalar> l = flexcomp::cross<Scalar>(z, tool.position - frames.origin[i]);
+    const Scalar column[6] = {l[0], l[1], l[2], z[0], z[1], z[2]};
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c < 6; ++c) a[r][c] += column[r] * column[c];
+    }
+  }
+  for (int k = 0; k < 6; ++k) a[k][k] -= Scalar(0.01F);
+  for (int k = 0; k < 6; ++k) {
+    if (!(a[k][k] > Scalar(0))) return false;
+    for (int r = k + 1; r < 6; ++r) {
+      const Scalar factor = a[r][k] / a[k][k];
+      for (int c = k; c < 6; ++c) a[r][c] -= factor * a[k][c];
+    }
+  }
+  return true;
+}
 
 }  // namespace budget

@@ -48,35 +48,6 @@ flexcomp_arm* arm_with(std::size_t curves, std::uint32_t fade_cycles) {
   return budget::start(memory, storage, curves, &settings);
 }
 
-/// True where the smallest singular value of the Jacobian (m, rad) at the tool point of the nominal arm is at least
-/// 0.1: where J J^T - 0.01 has a Cholesky factor.
-bool is_regular(const flexcomp::Model<Scalar, 6>& model, const std::array<Scalar, 6>& q) {
-  std::array<flexcomp::SinCos<Scalar>, 6> reading;
-  for (std::size_t i = 0; i < 6; ++i) reading[i] = flexcomp::sin_cos(q[i]);
-  flexcomp::Frames<Scalar, 6> frames;
-  flexcomp::detail::nominal_pass(model, reading, frames);
-  const flexcomp::Pose<Scalar> tool =
-      flexcomp::Pose<Scalar>{frames.rotation[6], frames.origin[6]} * model.nominal_tool();
-  Scalar a[6][6] = {};
-  for (std::size_t i = 0; i < 6; ++i) {
-    const flexcomp::Vector3<Scalar> z = frames.axis(i, 2);
-    const flexcomp::Vector3<Scalar> l = flexcomp::cross<Scalar>(z, tool.position - frames.origin[i]);
-    const Scalar column[6] = {l[0], l[1], l[2], z[0], z[1], z[2]};
-    for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < 6; ++c) a[r][c] += column[r] * column[c];
-    }
-  }
-  for (int k = 0; k < 6; ++k) a[k][k] -= Scalar(0.01F);
-  for (int k = 0; k < 6; ++k) {
-    if (!(a[k][k] > Scalar(0))) return false;
-    for (int r = k + 1; r < 6; ++r) {
-      const Scalar factor = a[r][k] / a[k][k];
-      for (int c = k; c < 6; ++c) a[r][c] -= factor * a[k][c];
-    }
-  }
-  return true;
-}
-
 /// What the same run's answers leave at the regular poses, and what a step takes there.
 bool regular_poses(flexcomp_arm* arm) {
   static flexcomp::Model<Scalar, 6> model;
@@ -95,7 +66,7 @@ bool regular_poses(flexcomp_arm* arm) {
     const std::uint32_t from = ticks();
     const flexcomp_status status = flexcomp_step(arm, q.data(), nullptr, corrected.data());
     const std::uint32_t count = instructions(from + own, ticks());
-    if (status != FLEXCOMP_OK || !is_regular(model, q)) continue;
+    if (status != FLEXCOMP_OK || !budget::is_regular(model, q)) continue;
     ++regular;
     sum += count;
     if (count > most) most = count;
