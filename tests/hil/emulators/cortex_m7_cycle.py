@@ -1,7 +1,7 @@
 """The control cycle is never disturbed: counted instructions of each step, its rhythm, and the commands' smoothness,
 with an idle bus and under full load.
 
-    cycle.py WORK SHIFT     inside hil/emulators/cortex-m7-modbus --shift SHIFT
+    cortex_m7_cycle.py WORK SHIFT     inside hil/emulators/cortex-m7-modbus --shift SHIFT
 
 The image measures itself (firmware/examples/cycle_monitor.h). One instruction takes 2^SHIFT ns of the controller's
 time, so its 25 MHz counter counts instructions.
