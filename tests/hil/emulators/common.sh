@@ -50,7 +50,7 @@ expect_statuses() {
   # shellcheck disable=SC2016
   expect "the status of the command, which finds the address" 37 '^modbus-rtu:\|^can:' \
     "$1" --image "$FLEXCOMP_IMAGE" sh -c 'echo "$FLEXCOMP_BUS"; exit 37'
-  expect "a command that does not end" 124 '' "$1" --image "$FLEXCOMP_IMAGE" --seconds 1 sleep 60
+  expect "a command that does not end" 124 begun "$1" --image "$FLEXCOMP_IMAGE" --seconds 1 sh -c 'echo begun; sleep 60'
 }
 
 # expect_serves WORDS OF EMULATOR...: the way a person starts it, without a command: it says the address and serves
