@@ -1,4 +1,6 @@
-/* The nominal robot of host/robots/tx60l.yaml for a C or C++ controller. */
+/* The nominal robot of tx60l.yaml for a C or C++ controller, written by "flexcomp export".
+ * nominal hash df0a54176298ff811af9e302d99e14a3e605f7101f2a2661818df7ba947ae615 */
+/* clang-format off */
 #ifndef FLEXCOMP_ROBOT_STAUBLI_TX60L_H
 #define FLEXCOMP_ROBOT_STAUBLI_TX60L_H
 

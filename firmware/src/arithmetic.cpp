@@ -1,5 +1,7 @@
 #include "flexcomp_firmware/arithmetic.hpp"
 
+#include "flexcomp/image.hpp"
+
 namespace flexcomp {
 namespace firmware {
 
@@ -9,16 +11,24 @@ void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
   compensate(model, q_command_rad, context, settings, out);
 }
 
+// As target_residual(), whose poses the trace needs as well; so they are evaluated once.
 Miss missed(const FirmwareModel& model, const Joints& q_rad, const Joints& q_command_rad,
             const FirmwareContext& context) {
-  const TargetResidual<Scalar> residual = target_residual(model, q_rad, q_command_rad, context);
   Workspace<Scalar, joints> workspace;
   const Pose<Scalar> nominal = nominal_forward(model, q_command_rad);
   const Pose<Scalar> flexible = forward(model, q_rad, context, workspace);
+  const Vector3<Scalar> p = nominal.position - flexible.position;
+  Triple<Scalar> r;
+  detail::rotation_error(columns_of(nominal.rotation), columns_of(flexible.rotation), r);
   const Scalar trace = dot<Scalar>(nominal.rotation.col(0), flexible.rotation.col(0)) +
                        dot<Scalar>(nominal.rotation.col(1), flexible.rotation.col(1)) +
                        dot<Scalar>(nominal.rotation.col(2), flexible.rotation.col(2));
-  return {residual.position_m, residual.orientation_rad, !(trace > Scalar(1))};
+  using std::sqrt;
+  return {sqrt(dot<Scalar>(p, p)), sqrt(dot(r, r)), !(trace > Scalar(1))};
+}
+
+Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model) {
+  return model_from_image(image, size, robot, model);
 }
 
 }  // namespace firmware

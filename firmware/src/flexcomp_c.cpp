@@ -1,4 +1,7 @@
 // The C interface: every object is built in the caller's memory, nothing else happens here.
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <new>
 
 #include "flexcomp.h"
@@ -108,40 +111,43 @@ Tcp& tcp_of(flexcomp_tcp* tcp) { return *reinterpret_cast<Tcp*>(tcp); }
 /// as the target's scalar.
 fw::Scalar scalar(double v) { return flexcomp::from_binary64<fw::Scalar>(v); }
 
+/// All that follows the name are doubles; they are looked at in one go.
+bool all_finite(const flexcomp_robot& robot) {
+  constexpr std::size_t first = offsetof(flexcomp_robot, links);
+  static_assert((sizeof robot - first) % sizeof(double) == 0, "only doubles");
+  const unsigned char* bytes = reinterpret_cast<const unsigned char*>(&robot) + first;
+  for (std::size_t k = 0; k < (sizeof robot - first) / sizeof(double); ++k) {
+    double v;
+    std::memcpy(&v, bytes + k * sizeof v, sizeof v);
+    if (!flexcomp::is_finite(v)) return false;
+  }
+  return true;
+}
+
 bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
-  if (from.name == nullptr || from.name[0] == 0) return false;
+  if (from.name == nullptr || from.name[0] == 0 || !all_finite(from)) return false;
   std::size_t length = 0;
   while (from.name[length] != 0) ++length;
   to.name_hash = flexcomp::name_hash(from.name, length);
-  bool finite = true;
-  const auto take = [&finite](double v) {
-    finite = finite && flexcomp::is_finite(v);
-    return v;
-  };
   for (std::size_t j = 0; j < fw::joints; ++j) {
-    flexcomp::NominalLink& link = to.links[j];
-    link.theta_rad = take(from.links[j].theta_rad);
-    link.d_m = take(from.links[j].d_m);
-    link.a_m = take(from.links[j].a_m);
-    link.alpha_rad = take(from.links[j].alpha_rad);
-    link.beta_rad = take(from.links[j].beta_rad);
-    to.limits[j].min_rad = take(from.min_rad[j]);
-    to.limits[j].max_rad = take(from.max_rad[j]);
+    const flexcomp_link& link = from.links[j];
+    to.links[j] = {link.theta_rad, link.d_m, link.a_m, link.alpha_rad, link.beta_rad};
+    to.limits[j] = {from.min_rad[j], from.max_rad[j]};
     if (!(scalar(from.min_rad[j]) < scalar(from.max_rad[j]))) return false;
   }
   for (std::size_t k = 0; k < 3; ++k) {
-    to.gravity_m_s2[k] = take(from.gravity_m_s2[k]);
-    to.tool_xyz_m[k] = take(from.tool_xyz_m[k]);
-    to.payload_com_m[k] = take(from.payload_com_m[k]);
+    to.gravity_m_s2[k] = from.gravity_m_s2[k];
+    to.tool_xyz_m[k] = from.tool_xyz_m[k];
+    to.payload_com_m[k] = from.payload_com_m[k];
   }
   fw::Scalar norm = fw::Scalar(0);
   for (std::size_t k = 0; k < 4; ++k) {
-    to.tool_wxyz[k] = take(from.tool_wxyz[k]);
+    to.tool_wxyz[k] = from.tool_wxyz[k];
     norm += scalar(from.tool_wxyz[k]) * scalar(from.tool_wxyz[k]);
   }
-  to.payload_kg = take(from.payload_kg);
-  to.reference_temperature_c = take(from.reference_temperature_c);
-  return finite && norm > fw::Scalar(0.998F) && norm < fw::Scalar(1.002F);
+  to.payload_kg = from.payload_kg;
+  to.reference_temperature_c = from.reference_temperature_c;
+  return norm > fw::Scalar(0.998F) && norm < fw::Scalar(1.002F);
 }
 
 }  // namespace

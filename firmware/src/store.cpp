@@ -31,16 +31,17 @@ Scalar spread(std::uint32_t pose, std::size_t joint) {
   return static_cast<Scalar>((pose * step[joint]) >> 8U) * Scalar(1.0F / 16777216.0F);
 }
 
-/// The first term whose basis this controller does not evaluate.
-struct BasisFinder {
-  std::uint32_t id = 0;
-  Refusal table(const Table&, const std::uint8_t*) { return Refusal::none; }
-  Refusal term(const Term<Scalar>& t) {
-    if (static_cast<std::uint8_t>(t.basis) < basis_count) return Refusal::none;
-    id = static_cast<std::uint8_t>(t.basis);
-    return Refusal::unknown_basis;
+/// The first basis that this controller does not evaluate, in an image whose records are in order up to there. A walk
+/// over the heads alone: to visit the whole image a second time would bring its reader into flash twice.
+std::uint32_t unknown_basis(const std::uint8_t* bytes, std::uint32_t size) {
+  constexpr std::size_t head = image::record_head_bytes;
+  for (std::size_t at = image::header_bytes; at + head + image::term_bytes <= size;
+       at += head + load_u16(bytes + at + 2)) {
+    const std::uint8_t basis = bytes[at + head + 2];
+    if (load_u16(bytes + at) == image::record_term && basis >= basis_count) return basis;
   }
-};
+  return 0;
+}
 
 /// A length in units of 1e-6, for the detail word; saturates.
 std::uint32_t micro(Scalar v) {
@@ -166,12 +167,8 @@ Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& he
     if (r == Refusal::truncated || r == Refusal::bad_length) detail = header.total_bytes;
     return r;
   }
-  r = model_from_image(staging_.data(), size, robot_, model);
-  if (r == Refusal::unknown_basis) {
-    BasisFinder finder;
-    visit_image<Scalar>(staging_.data(), size, finder);
-    detail = finder.id;
-  }
+  r = build_model(staging_.data(), size, robot_, model);
+  if (r == Refusal::unknown_basis) detail = unknown_basis(staging_.data(), size);
   if (r == Refusal::too_many_terms) detail = FirmwareCapacity::terms;
   if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
   if (r != Refusal::none) return r;

@@ -19,6 +19,7 @@ void add_status(CLI::App& app);
 void add_rollback(CLI::App& app);
 void add_probe(CLI::App& app);
 void add_report(CLI::App& app);
+void add_export(CLI::App& app);
 
 }  // namespace flexcomp::host
 

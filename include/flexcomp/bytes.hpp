@@ -27,7 +27,8 @@ namespace detail {
 
 /// binary64 bits to the nearest float (ties to even), in integer arithmetic: an M4F has no double unit, and
 /// the link forbids its soft-float routines. Results below the normal range become zero, above it infinity.
-inline float float_from_bits(std::uint64_t b) {
+/// Never inlined, like its opposite: a controller without doubles needs it for every number of its robot.
+[[gnu::noinline]] inline float float_from_bits(std::uint64_t b) {
   const std::uint32_t sign = static_cast<std::uint32_t>(b >> 32U) & 0x80000000U;
   const std::int32_t exponent = static_cast<std::int32_t>((b >> 52U) & 0x7FFU) - 1023;
   const std::uint64_t fraction = b & 0xFFFFFFFFFFFFFULL;
@@ -51,7 +52,7 @@ inline float float_from_bits(std::uint64_t b) {
 }
 
 /// float to the same value as binary64 bits, in integer arithmetic (subnormal floats become zero).
-inline std::uint64_t bits_from_float(float v) {
+[[gnu::noinline]] inline std::uint64_t bits_from_float(float v) {
   std::uint32_t b;
   std::memcpy(&b, &v, sizeof b);
   const std::uint64_t sign = static_cast<std::uint64_t>(b & 0x80000000U) << 32U;

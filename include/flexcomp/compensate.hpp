@@ -101,7 +101,7 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
 
 /// Largest magnitude in a list; NaNs are skipped.
 template <class S, std::size_t N>
-inline S greatest_of(const std::array<S, N>& v) {
+FLEXCOMP_ONCE S greatest_of(const std::array<S, N>& v) {
   S greatest = S(0);
   for (const S x : v) {
     if (x > greatest) greatest = x;
@@ -213,6 +213,8 @@ class Corrector {
 
   /// Whether any correction so far was damped or scaled down.
   bool gave_up() const { return gave_up_; }
+  /// Never above the square of the smallest singular value of either block (m^2, or 1 for orientation).
+  S regular() const { return regular_; }
   /// True where joints that turned by this sum of squares (rad^2) since set() have made the factored Jacobian a tenth
   /// wrong or more.
   bool is_worn_by(S square) const { return !(square <= S(0.01) * regular_); }
@@ -260,8 +262,8 @@ class Corrector {
   }
 
  private:
-  S solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest, S largest_turn,
-               std::array<S, N>& dq) {
+  FLEXCOMP_ONCE S solve_held(const Triple<S>& u, const Triple<S>& v, const Triple<S>& w, S largest,
+                             S largest_turn, std::array<S, N>& dq) {
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) {
       dq[i] = dot(column_[i].origin, u);
@@ -272,7 +274,7 @@ class Corrector {
     for (std::size_t i = 0; i < N; ++i) dq[i] += turn[i];
     return square_of(dq);
   }
-  static bool hold_below(std::array<S, N>& v, S largest) {
+  FLEXCOMP_ONCE static bool hold_below(std::array<S, N>& v, S largest) {
     const S greatest = greatest_of(v);
     if (!(greatest > largest)) return false;
     const S scale = largest / greatest;
@@ -403,9 +405,12 @@ template <class S, std::size_t N, class Cap>
 inline void take_aim(const Model<S, N, Cap>& model, Aim<S>& aim) {
   ThreeTriples<S>& axes = aim.flange.axes;
   if (model.turns_tool()) {
-    const ThreeTriples<S> turn = columns_of(model.tool_turn());
     const ThreeTriples<S> nominal = axes;
-    axes = {combine(nominal, turn.a), combine(nominal, turn.b), combine(nominal, turn.c)};
+    int k = 0;
+    for (Triple<S>* v : {&axes.a, &axes.b, &axes.c}) {
+      const Triple<S> turn = triple<S>(model.tool_turn().col(k++));
+      *v = combine(nominal, turn);
+    }
   }
   if (!model.has_base()) return;
   const Vector3<S>& p = model.base_pose().position;
@@ -508,12 +513,14 @@ constexpr int most_yield_steps = 6;
 template <class S>
 struct Enough {
   static constexpr S correction = S(1e-8);   ///< the next one is a third-order rest of it
+  static constexpr S rough = S(1e-20);       ///< square of what a first solution leaves
   static constexpr S refinement = S(2e-20);  ///< square of what the next refinement would be
-  static constexpr S yield_step = S(6e-20);  ///< square of what the next evaluation would change
+  static constexpr S yield_step = S(2e-19);  ///< square of what the next evaluation would change
 };
 template <>
 struct Enough<float> {
   static constexpr float correction = 1e-6F;
+  static constexpr float rough = 2.5e-13F;
   static constexpr float refinement = 1e-14F;
   static constexpr float yield_step = 1e-14F;
 };
@@ -587,7 +594,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
       fresh = true;
     }
     S square = corrector.solve(shift, turn, largest, largest_turn, dq);
-    bool done = fresh;
+    // The factored Jacobian is off by about the turn over the smallest singular value, and the correction with it.
+    bool done = fresh || turned * square <= Enough<S>::rough * corrector.regular();
     for (int n = 0; n < most_refinements && !done; ++n) {
       // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
       // order of the motion with it.
@@ -642,6 +650,10 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
     }
   }
   S square = square_of(dq);
+  if (loaded && load.is_plain && model.other_count() == 0 && model.other_loaded_count() == 0) {
+    // What the change above leaves out is a wave's bend, of the wave's own size: for a float mostly nothing.
+    if (square_of(yield) * square * square <= Enough<S>::yield_step) return;
+  }
   for (int k = 0; k < most_yield_steps; ++k) {
     std::array<S, N> now;
     if (loaded) {

@@ -212,8 +212,8 @@ inline CurveWeights<S> curve_weights(const S& q, std::uint16_t m) {
 }
 
 template <class S, std::size_t N>
-inline S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
-                   const Context<S, N>& context) {
+FLEXCOMP_ONCE S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
+                          const Context<S, N>& context) {
   switch (kind) {
     case Covariate::reading:
       return q[joint];
@@ -239,7 +239,7 @@ struct Cell {
 };
 
 template <class S>
-inline Cell<S> find_cell(const S* nodes, std::size_t count, const S& x) {
+FLEXCOMP_ONCE Cell<S> find_cell(const S* nodes, std::size_t count, const S& x) {
   if (!(x > nodes[0])) return {0, S(0)};
   std::size_t k = 0;
   while (k + 2 < count && x >= nodes[k + 1]) ++k;  // at most 64 nodes

@@ -4,6 +4,17 @@
 #ifndef FLEXCOMP_LINEAR_HPP
 #define FLEXCOMP_LINEAR_HPP
 
+// A failed assertion of Eigen's is a fault of this library. On a controller it ends in the firmware's own fault
+// hook, `extern "C" void FLEXCOMP_FAULT()`, which must not return; the C library's assert would print, and bring a
+// heap to do so. FLEXCOMP_FAULT names the function and must be the same in every source of a program, as Eigen's
+// templates are. Where it is not defined (on a host) assert() is left as it is.
+#ifdef FLEXCOMP_FAULT
+#ifdef EIGEN_CORE_H
+#error "include flexcomp before Eigen: FLEXCOMP_FAULT must reach all of Eigen in a program"
+#endif
+extern "C" [[noreturn]] void FLEXCOMP_FAULT();
+#define eigen_assert(condition) ((condition) ? static_cast<void>(0) : FLEXCOMP_FAULT())
+#endif
 #include <Eigen/Core>
 
 #include "flexcomp/compiler.hpp"

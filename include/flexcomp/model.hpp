@@ -353,7 +353,7 @@ class Model {
   void sort_effects() {
     only_joints_yield_ = true;
     for (S& c : compliance_) c = S(0);
-    std::array<Group, Cap::terms> group;
+    std::array<Group, Cap::terms> group{};
     bool summed_any = false;
     for (std::size_t k = 0; k < effect_count_; ++k) {
       const Term<S>& t = effects_[k];

@@ -12,13 +12,14 @@ namespace flexcomp {
 
 class Sha256 {
  public:
-  void update(std::uint8_t byte) {
+  // Not inlined: it is called from half a dozen places, each of which would bring its copy into flash.
+  [[gnu::noinline]] void update(std::uint8_t byte) {
     block_[size_++ & 63U] = byte;
     if ((size_ & 63U) == 0) compress();
   }
 
   /// Digest of all bytes so far; the object is spent.
-  std::array<std::uint8_t, 32> finish() {
+  [[gnu::noinline]] std::array<std::uint8_t, 32> finish() {
     const std::uint64_t bits = size_ * 8U;
     update(0x80);
     while ((size_ & 63U) != 56U) update(0);

@@ -126,7 +126,7 @@ inline SinCos<S> compose(const SinCos<S>& a, const SinCos<S>& b) {
 /// Below 1/64 rad a series replaces the kernel (next term 9e-20), and only the small difference is added, so
 /// that a correction of micro-radians loses nothing to rounding; above it the kernel is used.
 template <class S>
-inline SinCos<S> rotate(const SinCos<S>& t, const S& delta) {
+FLEXCOMP_ONCE SinCos<S> rotate(const SinCos<S>& t, const S& delta) {
   if (delta < S(0.015625) && delta > S(-0.015625)) {
     const S z = delta * delta;
     const S sd = delta - delta * z * (S(1.0 / 6) - z * (S(1.0 / 120) - z * S(1.0 / 5040)));

@@ -1,6 +1,4 @@
 // The parts of the instruction budget, one line each: "name count". tests/target/budget.cpp is the step alone.
-#include <Eigen/Eigenvalues>
-
 #include "budget_arm.hpp"
 #include "flexcomp/compensate.hpp"
 #include "instructions.hpp"
@@ -50,27 +48,33 @@ flexcomp_arm* arm_with(std::size_t curves, std::uint32_t fade_cycles) {
   return budget::start(memory, storage, curves, &settings);
 }
 
-/// Smallest singular value of the Jacobian (m, rad) at the tool point of the nominal arm.
-Scalar smallest_singular_value(const flexcomp::Model<Scalar, 6>& model, const std::array<Scalar, 6>& q) {
+/// True where the smallest singular value of the Jacobian (m, rad) at the tool point of the nominal arm is at least
+/// 0.1: where J J^T - 0.01 has a Cholesky factor.
+bool is_regular(const flexcomp::Model<Scalar, 6>& model, const std::array<Scalar, 6>& q) {
   std::array<flexcomp::SinCos<Scalar>, 6> reading;
   for (std::size_t i = 0; i < 6; ++i) reading[i] = flexcomp::sin_cos(q[i]);
   flexcomp::Frames<Scalar, 6> frames;
   flexcomp::detail::nominal_pass(model, reading, frames);
   const flexcomp::Pose<Scalar> tool =
       flexcomp::Pose<Scalar>{frames.rotation[6], frames.origin[6]} * model.nominal_tool();
-  Eigen::Matrix<Scalar, 6, 6> square = Eigen::Matrix<Scalar, 6, 6>::Zero();
+  Scalar a[6][6] = {};
   for (std::size_t i = 0; i < 6; ++i) {
     const flexcomp::Vector3<Scalar> z = frames.axis(i, 2);
     const flexcomp::Vector3<Scalar> l = flexcomp::cross<Scalar>(z, tool.position - frames.origin[i]);
     const Scalar column[6] = {l[0], l[1], l[2], z[0], z[1], z[2]};
     for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < 6; ++c) square(r, c) += column[r] * column[c];
+      for (int c = 0; c < 6; ++c) a[r][c] += column[r] * column[c];
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<Scalar, 6, 6>> solver(square, Eigen::EigenvaluesOnly);
-  const Scalar least = solver.eigenvalues()[0];
-  using std::sqrt;
-  return least > Scalar(0) ? sqrt(least) : Scalar(0);
+  for (int k = 0; k < 6; ++k) a[k][k] -= Scalar(0.01F);
+  for (int k = 0; k < 6; ++k) {
+    if (!(a[k][k] > Scalar(0))) return false;
+    for (int r = k + 1; r < 6; ++r) {
+      const Scalar factor = a[r][k] / a[k][k];
+      for (int c = k; c < 6; ++c) a[r][c] -= factor * a[k][c];
+    }
+  }
+  return true;
 }
 
 /// What the same run's answers leave at the regular poses, and what a step takes there.
@@ -78,7 +82,8 @@ bool regular_poses(flexcomp_arm* arm) {
   static flexcomp::Model<Scalar, 6> model;
   const flexcomp::NominalRobot<6> robot = selftest::tx60l();
   const std::size_t size = flexcomp::load_u32(storage.bytes + FLEXCOMP_SLOT_BYTES - 32 + 4);
-  if (flexcomp::model_from_image<Scalar>(storage.bytes, size, robot, model) != flexcomp::Refusal::none) return false;
+  if (flexcomp::model_from_image<Scalar>(storage.bytes, size, robot, model) != flexcomp::Refusal::none)
+    return false;
   const flexcomp::Context<Scalar, 6> context = flexcomp::default_context<Scalar>(robot);
   budget::Commands commands(1);
   Scalar left = Scalar(0);
@@ -90,7 +95,7 @@ bool regular_poses(flexcomp_arm* arm) {
     const std::uint32_t from = ticks();
     const flexcomp_status status = flexcomp_step(arm, q.data(), nullptr, corrected.data());
     const std::uint32_t count = instructions(from + own, ticks());
-    if (status != FLEXCOMP_OK || smallest_singular_value(model, q) < Scalar(0.1F)) continue;
+    if (status != FLEXCOMP_OK || !is_regular(model, q)) continue;
     ++regular;
     sum += count;
     if (count > most) most = count;
@@ -122,7 +127,8 @@ void image_check() {
   const flexcomp::Refusal refusal = flexcomp::check_image(storage.bytes, size, hash, robot.name_hash, header);
   const std::uint32_t to = ticks();
   if (refusal != flexcomp::Refusal::none) return;
-  print("image check, tenths per byte: ", instructions(from + own, to) * 10U / static_cast<std::uint32_t>(size), "\n");
+  print("image check, tenths per byte: ",
+        instructions(from + own, to) * 10U / static_cast<std::uint32_t>(size), "\n");
 }
 
 int frames_sent;

@@ -1,5 +1,5 @@
-// The core on a target against the host: image, forward model and compensation bit by bit, in the target's scalar;
-// in float besides within a tolerance of the double result.
+// The core on a target against the host: image, forward model, columns of H and compensation bit by
+// bit, in the target's scalar; in float besides within a tolerance of the double result.
 #include <cstring>
 
 #include "golden.hpp"
@@ -16,6 +16,8 @@ constexpr bool in_float = sizeof(Scalar) == 4;
 // may damp a little differently, so only regular poses are compared there.
 constexpr float pose_tolerance = 1e-6F;
 constexpr float joint_tolerance = 4e-6F;
+// Columns are levers (at most 1.1 m) and axes, times the basis: relative to the column's largest number.
+constexpr float column_tolerance = 4e-6F;
 
 bool fail(const char* what, std::size_t command, std::size_t number, std::uint64_t expected,
           std::uint64_t got) {
@@ -77,6 +79,32 @@ bool results_agree() {
       }
     }
   }
+  for (std::size_t c = 0; c < selftest::column_command_count; ++c) {
+    for (std::size_t e = 0; e < selftest::entry_count; ++e) {
+      float largest = 0;
+      for (std::size_t i = 0; i < 6; ++i) {
+        const Scalar got = results.columns[c][e][i];
+        const std::uint64_t expected =
+            in_float ? golden::columns_in_float[c][e][i] : golden::columns_in_double[c][e][i];
+        if (bits(got) != expected) return fail("column of H", c, 6 * e + i, expected, bits(got));
+        if constexpr (in_float) {
+          const float exact =
+              flexcomp::from_binary64<float>(flexcomp::double_of(golden::columns_in_double[c][e][i]));
+          const float size = exact < 0 ? -exact : exact;
+          if (size > largest) largest = size;
+        }
+      }
+      for (std::size_t i = 0; i < 6 && in_float; ++i) {
+        const float got = flexcomp::from_binary64<float>(
+            flexcomp::double_of(flexcomp::to_binary64_bits(results.columns[c][e][i])));
+        const float exact =
+            flexcomp::from_binary64<float>(flexcomp::double_of(golden::columns_in_double[c][e][i]));
+        const float off = got < exact ? exact - got : got - exact;
+        if (!(off <= column_tolerance * largest))
+          return fail("tolerance of a column of H", c, 6 * e + i, bits(exact), bits(got));
+      }
+    }
+  }
   return true;
 }
 
@@ -84,6 +112,6 @@ bool results_agree() {
 
 int main() {
   if (!images_agree() || !results_agree()) return 1;
-  flexcomp::boards::write("core: image, forward model and compensation agree with the host\n");
+  flexcomp::boards::write("core: image, forward model, columns of H and compensation agree with the host\n");
   return 0;
 }

@@ -24,6 +24,27 @@ void print(const selftest::Results<S>& results, const char* type, const char* na
   std::printf("};\n");
 }
 
+template <class S, class Bits>
+void print_columns(const selftest::Results<S>& results, const char* type, const char* name) {
+  std::printf("constexpr %s %s[%zu][%zu][6] = {\n", type, name, selftest::column_command_count,
+              selftest::entry_count);
+  for (const auto& columns : results.columns) {
+    std::printf("  {\n");
+    for (const auto& column : columns) {
+      std::printf("    {");
+      for (std::size_t i = 0; i < column.size(); ++i) {
+        Bits bits;
+        std::memcpy(&bits, &column[i], sizeof bits);
+        std::printf("%s0x%0*" PRIx64, i == 0 ? "" : ", ", static_cast<int>(2 * sizeof bits),
+                    static_cast<std::uint64_t>(bits));
+      }
+      std::printf("},\n");
+    }
+    std::printf("  },\n");
+  }
+  std::printf("};\n");
+}
+
 template <class S>
 void print_status(const selftest::Results<S>& results, const char* name) {
   std::printf("constexpr std::uint8_t %s[%zu] = {", name, selftest::command_count);
@@ -61,8 +82,10 @@ int main() {
   std::printf("}};\n\n");
   print<double, std::uint64_t>(in_double, "std::uint64_t", "in_double");
   print_status(in_double, "status_in_double");
+  print_columns<double, std::uint64_t>(in_double, "std::uint64_t", "columns_in_double");
   print<float, std::uint32_t>(in_float, "std::uint32_t", "in_float");
   print_status(in_float, "status_in_float");
+  print_columns<float, std::uint32_t>(in_float, "std::uint32_t", "columns_in_float");
   std::printf("\n}  // namespace golden\n");
   return 0;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "flexcomp/compensate.hpp"
+#include "flexcomp/identification.hpp"
 #include "flexcomp/image.hpp"
 
 namespace selftest {
@@ -102,23 +103,28 @@ constexpr std::size_t image_bytes =
     entry_count * (flexcomp::image::record_head_bytes + flexcomp::image::term_bytes);
 using Image = std::array<std::uint8_t, image_bytes>;
 
+/// One of the entries as a term.
+template <class S>
+inline flexcomp::Term<S> make_term(const Entry& e) {
+  flexcomp::Term<S> term;
+  term.place = {e.body, e.slot};
+  term.basis = e.basis;
+  term.joint = e.joint;
+  term.argument = flexcomp::from_binary64<S>(e.argument);
+  term.coefficient = flexcomp::from_binary64<S>(e.coefficient);
+  term.effect = e.basis == Basis::load_torque   ? Effect::joint_compliance
+                : e.basis == Basis::link_weight ? Effect::link_gravity
+                : e.basis == Basis::curve       ? Effect::joint_curve
+                                                : Effect::geometric;
+  if (e.basis == Basis::curve) term.table = 0;
+  return term;
+}
+
 /// The image of the entries; needs a scalar that holds their values (double). 0 where it does not fit.
 template <class S>
 inline std::size_t make_image(Image& image) {
   static std::array<flexcomp::Term<S>, entry_count> terms;
-  for (std::size_t k = 0; k < entry_count; ++k) {
-    const Entry& e = entries[k];
-    terms[k].place = {e.body, e.slot};
-    terms[k].basis = e.basis;
-    terms[k].joint = e.joint;
-    terms[k].argument = flexcomp::from_binary64<S>(e.argument);
-    terms[k].coefficient = flexcomp::from_binary64<S>(e.coefficient);
-    terms[k].effect = e.basis == Basis::load_torque   ? Effect::joint_compliance
-                      : e.basis == Basis::link_weight ? Effect::link_gravity
-                      : e.basis == Basis::curve       ? Effect::joint_curve
-                                                      : Effect::geometric;
-    if (e.basis == Basis::curve) terms[k].table = 0;
-  }
+  for (std::size_t k = 0; k < entry_count; ++k) terms[k] = make_term<S>(entries[k]);
   static std::array<S, curve_size> values;
   for (std::size_t k = 0; k < curve_size; ++k) values[k] = flexcomp::from_binary64<S>(curve[k]);
   flexcomp::Table table;
@@ -142,11 +148,16 @@ constexpr std::size_t command_count = sizeof commands / sizeof commands[0];
 
 /// Per command: 9 of the rotation (row by row), 3 of the position, 6 corrected joints.
 constexpr std::size_t numbers_per_command = 18;
+/// The columns of H (identification.hpp) of every entry are taken at these commands: an ordinary pose without and
+/// one with an external force.
+constexpr std::size_t column_commands[] = {1, 2};
+constexpr std::size_t column_command_count = sizeof column_commands / sizeof column_commands[0];
 template <class S>
 struct Results {
   flexcomp::Refusal refusal = flexcomp::Refusal::none;
   std::array<std::array<S, numbers_per_command>, command_count> numbers{};
   std::array<std::uint8_t, command_count> status{};
+  std::array<std::array<std::array<S, 6>, entry_count>, column_command_count> columns{};
 };
 
 template <class S>
@@ -174,6 +185,15 @@ inline void evaluate(const Image& image, Results<S>& results) {
     const flexcomp::Compensated<S, 6> corrected = flexcomp::compensate(model, q, context);
     for (std::size_t i = 0; i < 6; ++i) out[12 + i] = corrected.q[i];
     results.status[k] = static_cast<std::uint8_t>(corrected.status);
+    for (std::size_t c = 0; c < column_command_count; ++c) {
+      if (column_commands[c] != k) continue;
+      static flexcomp::Linearisation<S, 6> at;
+      flexcomp::linearise(model, q, context, at);
+      for (std::size_t e = 0; e < entry_count; ++e) {
+        const flexcomp::Vector6<S> column = flexcomp::column(model, at, make_term<S>(entries[e]), context);
+        for (int r = 0; r < 6; ++r) results.columns[c][e][static_cast<std::size_t>(r)] = column[r];
+      }
+    }
   }
 }
 

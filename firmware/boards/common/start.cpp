@@ -30,7 +30,7 @@ int flexcomp_program() asm("main");
 /// A pure virtual call would be a programming error; without this the C++ library brings its own terminate.
 [[noreturn]] void __cxa_pure_virtual() { flexcomp_board_fault(); }
 
-/// What newlib's assert() calls, which Eigen's assertions use. newlib's own prints, and brings a heap to do so.
+/// What newlib's assert() calls. newlib's own prints, and brings a heap to do so.
 [[noreturn]] void __assert_func(const char* file, int, const char*, const char* condition) {
   flexcomp::boards::write("assertion failed: ");
   flexcomp::boards::write(condition);
@@ -38,6 +38,13 @@ int flexcomp_program() asm("main");
   flexcomp::boards::write(file);
   flexcomp::boards::write("\n");
   flexcomp::boards::exit(98);
+}
+
+/// Where an assertion of the library or of Eigen ends (FLEXCOMP_FAULT): the library itself is wrong. A real
+/// controller stops its drives here.
+[[noreturn]] void flexcomp_fault() {
+  flexcomp::boards::write("fault: an assertion of the library failed\n");
+  flexcomp::boards::exit(97);
 }
 
 /// newlib's abort would pull in signals.

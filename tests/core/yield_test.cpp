@@ -1,0 +1,281 @@
+// What the control cycle computes in its own way, against the forward model that everything else uses: torques and
+// levers carried through the links' frames, curves in powers, first-order motions; and the way of sets whose effects
+// only turn joints against the way of all other sets.
+#include <flexcomp/compensate.hpp>
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <gtest/gtest.h>
+
+#include "support/arms.hpp"
+
+namespace {
+
+using arms::Joints;
+using flexcomp::Basis;
+using flexcomp::Factor;
+using flexcomp::Model;
+namespace detail = flexcomp::detail;
+namespace slot = flexcomp::slot;
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr int part = 20;
+#else
+constexpr int part = 1;
+#endif
+
+std::array<flexcomp::SinCos<double>, 6> angles(const Model<double>& model, const Joints& q) {
+  std::array<flexcomp::SinCos<double>, 6> a;
+  for (std::size_t i = 0; i < 6; ++i) a[i] = compose(flexcomp::sin_cos(q[i]), model.shape(i).offset);
+  return a;
+}
+
+/// Every kind of term that bends joints by loads, also of other joints and of a curve times torque.
+arms::TermSet<double> loaded_terms(const arms::Arm& arm, arms::Random& random) {
+  arms::TermSet<double> set = arms::table1(arm);
+  set.add(arms::on_load(slot::mass), Basis::one, 0.2);
+  set.add(arms::on_load(slot::com_y), Basis::one, -0.01);
+  set.add(arms::on_tool(slot::x), Basis::one, 0.002);
+  for (std::size_t i = 0; i < 6; ++i) {
+    set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.around(1e-7), i);
+    set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.around(1e-5), i);
+  }
+  std::vector<double> c(24);
+  for (double& v : c) v = random.around(1e-5);
+  flexcomp::Term<double>& t = set.add(arms::on_link(3, slot::theta), Basis::curve, 1.0, 2);
+  t.table = set.add_curve(c);
+  t.factor = Factor::load_torque;
+  return set;
+}
+
+TEST(Yield, TorquesAndLeversAreThoseOfTheForwardModel) {
+  arms::Random random(31);
+  double worst = 0, largest = 0;
+  for (const arms::Arm& arm : arms::all()) {
+    const arms::TermSet<double> set = loaded_terms(arm, random);
+    Model<double> model;
+    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    ASSERT_TRUE(model.only_joints_yield());
+    for (int n = 0; n < 20000 / part; ++n) {
+      const Joints q = random.pose(arm.robot);
+      flexcomp::Context<double, 6> context = arms::random_context(arm.robot, random);
+      if (n % 2 == 0) context.force_n = {0, 0, 0};
+      flexcomp::Workspace<double> ws;
+      flexcomp::forward(model, q, context, ws);
+      detail::CarriedLoad<double> load;
+      detail::carried_load(model, context, load);
+      ASSERT_EQ(load.is_plain, n % 2 == 0);
+      Joints yield;
+      detail::loaded_yield(model, q, angles(model, q), load, yield);
+      for (std::size_t i = 0; i < 6; ++i) {
+        worst = std::max(worst, std::abs(yield[i] - ws.slots.link[i][slot::theta]));
+        largest = std::max(largest, std::abs(yield[i]));
+      }
+    }
+  }
+  std::printf("[ measured ] yield up to %.1e rad, both ways agree to %.1e rad\n", largest, worst);
+  EXPECT_GT(largest, 1e-3);
+  EXPECT_LE(worst, 1e-13);
+}
+
+TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
+  arms::Random random(32);
+  double worst = 0, worst_change = 0;
+  for (const arms::Arm& arm : arms::all()) {
+    arms::TermSet<double> set = arms::table1(arm);
+    Model<double> model;
+    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
+    detail::CarriedLoad<double> load;
+    detail::carried_load(model, context, load);
+    ASSERT_TRUE(load.is_plain);
+    for (int n = 0; n < 20000 / part; ++n) {
+      const Joints q = random.pose(arm.robot);
+      std::array<detail::JointAxis<double>, 6> joints;
+      detail::FlangePose<double> flange;
+      detail::rigid_pass(model.shapes(), angles(model, q), joints, flange);
+      Joints carried, around, change, moved;
+      detail::loaded_yield(model, q, angles(model, q), load, carried);
+      detail::YieldAround<double, 6> chain;
+      chain.set(model, q, joints, flange, load, around);
+      for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(carried[i] - around[i]));
+
+      // Against differences. What bends a link between a lever's ends is left out on purpose: that is joint 4 of the
+      // arm with three parallel axes.
+      Joints by, beyond = q, before = q;
+      for (std::size_t i = 0; i < 6; ++i) {
+        by[i] = i == 3 && arm.parallel_3 ? 0 : random.around(1e-4);
+        beyond[i] += by[i];
+        before[i] -= by[i];
+      }
+      chain.change(model, joints, by, change);
+      Joints ahead, behind;
+      detail::loaded_yield(model, beyond, angles(model, beyond), load, ahead);
+      detail::loaded_yield(model, before, angles(model, before), load, behind);
+      for (std::size_t i = 0; i < 6; ++i) {
+        moved[i] = 0.5 * (ahead[i] - behind[i]);
+        worst_change = std::max(worst_change, std::abs(moved[i] - change[i]));
+      }
+    }
+  }
+  std::printf("[ measured ] around a chain to %.1e rad; for turns of 1e-4 rad the change to %.1e rad\n",
+              worst, worst_change);
+  EXPECT_LE(worst, 1e-13);
+  EXPECT_LE(worst_change, 1e-9);  // 1e-4 rad times a slope of up to 1e-2 is 1e-6
+}
+
+TEST(Yield, ACurveInPowersIsTheSpline) {
+  arms::Random random(33);
+  for (const std::size_t size : {6U, 7U, 18U, 128U, 256U}) {
+    arms::TermSet<double> set;
+    std::vector<double> c(size);
+    for (double& v : c) v = random.around(1);
+    flexcomp::Term<double>& t = set.add(arms::on_link(1, slot::theta), Basis::curve, 1.0, 0);
+    t.table = set.add_curve(c);
+    Model<double> model;
+    ASSERT_EQ(model.prepare(arms::tx60l(), set.list()), flexcomp::Refusal::none);
+    double value = 0, slope = 0, bend = 0;
+    for (int n = 0; n < 20000 / part; ++n) {
+      const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.around(30);
+      detail::Local<double> at{0, 0, 0};
+      detail::add_local_curve(model, t, q, 1.0, at);
+      const double h = 1e-4 / static_cast<double>(size);
+      const double left = arms::curve_value(c, q - h), here = arms::curve_value(c, q),
+                   right = arms::curve_value(c, q + h);
+      value = std::max(value, std::abs(at.value - here));
+      const double m = static_cast<double>(size);
+      slope = std::max(slope, std::abs(at.slope - (right - left) / (2 * h)) / m);
+      bend = std::max(bend, std::abs(2 * at.half_curvature - (right - 2 * here + left) / (h * h)) / (m * m));
+    }
+    EXPECT_LE(value, 1e-12) << size;
+    EXPECT_LE(slope, 1e-7) << size;
+    EXPECT_LE(bend, 1e-4) << size;  // a cubic's second derivative has corners, and differences see both sides
+  }
+}
+
+TEST(Yield, FirstOrderMotionsAreThoseOfTheChain) {
+  arms::Random random(34);
+  for (const arms::Arm& arm : arms::all()) {
+    arms::TermSet<double> set = arms::table1_geometry(arm, 0.01);
+    for (std::uint8_t k = 0; k < 6; ++k) set.add(arms::on_tool(k), Basis::one, 1e-5);
+    Model<double> model;
+    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    for (int n = 0; n < 2000 / part; ++n) {
+      const Joints q = random.pose(arm.robot);
+      flexcomp::Workspace<double> ws;
+      const flexcomp::Pose<double> nominal = flexcomp::nominal_forward(model, q);
+      const flexcomp::Pose<double> real =
+          flexcomp::forward(model, q, flexcomp::default_context<double>(arm.robot), ws);
+      std::array<flexcomp::SinCos<double>, 6> angle;
+      for (std::size_t i = 0; i < 6; ++i)
+        angle[i] = compose(flexcomp::sin_cos(q[i]), model.nominal(i).offset);
+      flexcomp::Twist<double> move;
+      detail::constant_twist(model, angle, move);
+      const flexcomp::Twist<double>& base = model.base_twist();
+      const Eigen::Vector3d turn(move.angular.x + base.angular.x, move.angular.y + base.angular.y,
+                                 move.angular.z + base.angular.z);
+      const Eigen::Vector3d shift(move.linear.x + base.linear.x, move.linear.y + base.linear.y,
+                                  move.linear.z + base.linear.z);
+      const Eigen::Vector3d expected = real.position - nominal.position;
+      ASSERT_LE((shift + turn.cross(nominal.position) - expected).norm(), 3e-9) << arm.name;
+      const Eigen::Matrix3d r = real.rotation * nominal.rotation.transpose();
+      const Eigen::Vector3d w(r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1));
+      ASSERT_LE((turn - 0.5 * w).norm(), 3e-9) << arm.name;
+    }
+  }
+}
+
+/// Largest miss of the position over regular poses, m.
+double left_by(const arms::Robot& robot, const Model<double>& model, arms::Random& random, bool with_force) {
+  const arms::NominalJacobian jacobian(robot);
+  double left = 0;
+  for (int n = 0; n < 4000 / part;) {
+    const Joints q = random.pose(robot);
+    const Eigen::Matrix<double, 6, 6> j = jacobian(q);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(j * j.transpose(),
+                                                                            Eigen::EigenvaluesOnly);
+    if (!(solver.eigenvalues()[0] >= 0.01)) continue;
+    ++n;
+    flexcomp::Context<double, 6> context = flexcomp::default_context<double>(robot);
+    for (double& d : context.direction) d = static_cast<double>(random.below(3)) - 1;
+    context.temperature_c = random.uniform(10, 40);
+    if (with_force) context.force_n = {random.around(20), random.around(20), random.around(20)};
+    const flexcomp::Compensated<double, 6> r = flexcomp::compensate(model, q, context);
+    if (r.status != flexcomp::StepStatus::ok) continue;
+    left = std::max(left, flexcomp::target_residual(model, r.q, q, context).position_m);
+  }
+  return left;
+}
+
+TEST(Yield, AllKindsOfTermsThatTurnJointsAreTakenOff) {
+  arms::Random random(35);
+  for (const arms::Arm& arm : arms::all()) {
+    arms::TermSet<double> set = arms::table1(arm);
+    arms::add_joint_curves(set, random, 200e-6, 40);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const flexcomp::Place own = arms::on_link(i + 1, slot::theta);
+      set.add(own, Basis::sine, random.around(1e-4), i, 2);
+      set.add(own, Basis::cosine, random.around(2e-5), i, 100);
+      set.add(own, Basis::reading, random.around(2e-4), i);
+      set.add(own, Basis::direction, random.around(1e-4), i);
+      set.add(own, Basis::sine, random.around(1e-4), (i + 1) % 6, 1);
+      set.add(own, Basis::reading, random.around(1e-4), (i + 5) % 6);
+    }
+    set.add(arms::on_tool(slot::rx), Basis::one, 1e-3);
+    set.add(arms::on_tool(slot::z), Basis::one, -1e-3);
+    Model<double> model;
+    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    ASSERT_TRUE(model.only_joints_yield());
+    for (const bool with_force : {false, true}) {
+      const double left = left_by(arm.robot, model, random, with_force);
+      std::printf("[ measured ] %s%s: %.1e m\n", arm.name, with_force ? ", force" : "", left);
+      EXPECT_LE(left, 2e-9) << arm.name;
+    }
+  }
+}
+
+TEST(Yield, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
+  arms::Random random(36);
+  for (const arms::Arm& arm : arms::all()) {
+    arms::TermSet<double> set = arms::table1(arm);
+    Model<double> joints_only;
+    ASSERT_EQ(joints_only.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    // Nothing, but it could be something: the same arm as far as any command can tell.
+    set.add(arms::on_link(3, slot::a), Basis::direction, 1e-3, 2);
+    Model<double> any;
+    ASSERT_EQ(any.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    ASSERT_TRUE(joints_only.only_joints_yield());
+    ASSERT_FALSE(any.only_joints_yield());
+    const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
+    const arms::NominalJacobian jacobian(arm.robot);
+    double worst = 0;
+    for (int n = 0; n < 4000 / part; ++n) {
+      const Joints q = random.pose(arm.robot);
+      const Eigen::Matrix<double, 6, 6> j = jacobian(q);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(j * j.transpose(),
+                                                                              Eigen::EigenvaluesOnly);
+      if (!(solver.eigenvalues()[0] >= 0.01)) continue;
+      const auto a = flexcomp::compensate(joints_only, q, context);
+      const auto b = flexcomp::compensate(any, q, context);
+      ASSERT_EQ(a.status, b.status);
+      if (a.status != flexcomp::StepStatus::ok) continue;
+      for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(a.q[i] - b.q[i]));
+    }
+    std::printf("[ measured ] %s: the two ways differ by %.1e rad\n", arm.name, worst);
+    EXPECT_LE(worst, 3e-8) << arm.name;
+    // Both kinds are worth trying with everything: what moves more than joints must be taken off as well.
+    set.add(arms::on_link(2, slot::alpha), Basis::load_moment_x, 2e-6, 1);
+    set.add(arms::on_link(5, slot::gamma), Basis::sine, 1e-4, 4, 1);
+    Model<double> more;
+    ASSERT_EQ(more.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const double left = left_by(arm.robot, more, random, true);
+    std::printf("[ measured ] %s, links and frames too: %.1e m\n", arm.name, left);
+    EXPECT_LE(left, 2e-8) << arm.name;
+  }
+}
+
+}  // namespace

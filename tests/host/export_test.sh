@@ -1,0 +1,40 @@
+#!/bin/bash
+# flexcomp export: the header in the repository is what the command writes, every robot's header is C90 and C++ without
+# a warning, and what cannot be written is refused by name.
+set -u
+flexcomp=$FLEXCOMP_BIN_DIR/flexcomp
+robots=$FLEXCOMP_SOURCE_DIR/host/robots
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+
+"$flexcomp" export --robot "$robots/tx60l.yaml" --as c -o tx60l.h --json tx60l.json --quiet || fail "exit status $?"
+cmp tx60l.h "$FLEXCOMP_SOURCE_DIR/firmware/examples/tx60l.h" ||
+  fail "firmware/examples/tx60l.h is not what the command writes: export it again"
+hash=$(sed -n 's/^ \* nominal hash \([0-9a-f]\{64\}\) \*\/$/\1/p' tx60l.h)
+grep -q "\"nominal_hash\": \"$hash\"" tx60l.json || fail "header and JSON name different hashes: $(cat tx60l.json)"
+
+for robot in "$robots"/*.yaml; do
+  name=$(basename "$robot" .yaml)
+  "$flexcomp" export --robot "$robot" --as c -o "$name.h" >out.txt || fail "$name: exit status $?"
+  constant=$(sed -n 's/^.* as the C constant \([^,]*\),.*$/\1/p' out.txt)
+  # Twice, because the guard has to work as well.
+  printf '#include "%s.h"\n#include "%s.h"\nconst flexcomp_robot* robot(void);\nconst flexcomp_robot* robot(void) { return &%s; }\n' \
+    "$name" "$name" "$constant" | tee "$name.c" >"$name.cpp"
+  include=(-I "$FLEXCOMP_SOURCE_DIR/firmware/include" -Wall -Wextra -pedantic-errors -Werror -c -o /dev/null)
+  cc -std=c90 "${include[@]}" "$name.c" || fail "$name.h is not C90"
+  c++ -std=c++17 "${include[@]}" "$name.cpp" || fail "$name.h is not C++17"
+done
+
+"$flexcomp" export --robot "$robots/tx60l.yaml" --as rust -o robot.rs >out.txt 2>&1
+[ $? -eq 2 ] || fail "--as rust is no usage error"
+grep -q rust out.txt || fail "the format is not named: $(cat out.txt)"
+[ -e robot.rs ] && fail "a refused format leaves a file"
+"$flexcomp" export --robot absent.yaml --as c -o absent.h >out.txt 2>&1
+[ $? -eq 3 ] || fail "an absent robot is not status 3"
+"$flexcomp" export --help | grep -q 'flexcomp_init' || fail "the help does not say what to do with the header"
+
+[ "$failures" -eq 0 ] && echo "headers of $(ls "$robots"/*.yaml | wc -l) robots"
+[ "$failures" -eq 0 ]
