@@ -22,11 +22,11 @@ CYCLE_TICKS = 25000
 PATH_CYCLES = 1000
 ENOUGH_CYCLES = 900
 STATES = ("no_set", "fading", "active", "fading_out")
-# As `identify` makes a set (geometry, compliance, gravity), and with everything that a set may hold: the step goes
-# different ways for them.
+# As `identify` makes a set (geometry, compliance, gravity), and with eleven kinds of effect, also such as move more than
+# the joints: the step goes different ways for them.
 SETS = {
     "identified": buses.CALIBRATION[:buses.CALIBRATION.index("  - {{effect: gear_harmonic")],
-    "every-effect": buses.CALIBRATION,
+    "many-effects": buses.CALIBRATION,
 }
 VERIFY, COMMIT, ROLLBACK, ABORT, RESTORE = 2, 3, 6, 7, 8
 
