@@ -3,10 +3,9 @@
  *
  * One loop does all. It looks at the clock before anything else, and between two looks it makes at most one call
  * into the library for the bus or the store. Bus traffic, however dense, therefore delays a cycle by no more than
- * the longest of these calls. Most take no longer than a cycle itself (a frame, a piece of a slot) or two (a
- * probe); but a whole set is checked in one call, at its commit and at a rollback, which takes as long as about
- * twenty cycles: half a million instructions, a millisecond at 500 MHz. A push may thus cost this loop a cycle,
- * which it leaves out.
+ * the longest of these calls. Most of them are small; but a whole set is checked in one call, at its commit and at
+ * a rollback, which takes many times as long as a step. Where that is longer than the period, a push costs this
+ * loop a cycle, which it leaves out.
  *
  * Where your processor has a timer interrupt, control_cycle() belongs into it, and nothing delays it at all:
  * flexcomp_step() may interrupt everything else here at any point (flexcomp.h, "Threads"). It is polled here

@@ -1,10 +1,10 @@
 /* A whole controller in one file: the control cycle corrects joint commands in a timer interrupt, the background
  * serves Modbus RTU and the parameter store in what time is left. Plain C; what is particular to a board is
- * behind board.h, what measures the cycle is in cycle_monitor.h. */
+ * behind modbus_rtu_board.h, what measures the cycle is in cycle_monitor.h. */
 #include <flexcomp.h>
 
-#include "board.h"
 #include "cycle_monitor.h"
+#include "modbus_rtu_board.h"
 #include "tx60l.h"
 
 enum { UNIT = 1 }; /* of this controller on the bus */
@@ -93,7 +93,7 @@ int main(void) {
   settings.cycle_us = BOARD_CYCLE_US;
 
   board_init();
-  arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, &settings, &board_storage);
+  arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, &settings, board_storage);
   if (arm == NULL) return 1;
   flexcomp_boot(arm);
   flexcomp_rtu* rtu =

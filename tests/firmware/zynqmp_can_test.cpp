@@ -1,5 +1,5 @@
 // The CAN driver of the ZCU102 as it is on the board, over registers in memory. In the emulator the other setting of its
-// switch runs (tests/hil/cortex_r5f); here are the words of the manual (UG1085, "CAN Controller").
+// switch runs (tests/hil/emulators); here are the words of the manual (UG1085, "CAN Controller").
 #include <gmock/gmock.h>
 
 #include <array>

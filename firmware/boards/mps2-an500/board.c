@@ -1,9 +1,7 @@
-/* Arm MPS2 with the Cortex-M7 image AN500, as far as the examples need it: SysTick, a CMSDK timer as a clock and
- * two CMSDK serial lines. The machine has no non-volatile memory: the two slots are RAM that behaves like flash
- * (whole-slot erase in pieces, each unit written once) and forgets with the power. */
-#include "board.h"
-
-#include <string.h>
+/* modbus_rtu_board.h on an Arm MPS2 with the Cortex-M7 image AN500: SysTick, a CMSDK timer as a clock and two CMSDK
+ * serial lines. The machine has no non-volatile memory. */
+#include "modbus_rtu_board.h"
+#include "slots_in_ram.h"
 
 #define REGISTER(address) (*(volatile uint32_t*)(address))
 
@@ -139,46 +137,4 @@ void board_send(unsigned line, const uint8_t* bytes, size_t size) {
  * to do, so a pause within a frame says nothing. Below the second after which a client asks again. */
 uint32_t board_bus_gap_us(void) { return 500000; }
 
-/* --- slots --------------------------------------------------------------------------------------- */
-
-enum { UNIT_BYTES = 32, ERASE_BYTES = 1024, SLOT_UNITS = FLEXCOMP_SLOT_BYTES / UNIT_BYTES };
-static uint8_t slots[2][FLEXCOMP_SLOT_BYTES];
-static uint8_t written[2][SLOT_UNITS];
-static uint32_t erased_bytes;
-
-static flexcomp_storage_result slot_read(void* user, unsigned slot, uint32_t offset, uint8_t* to,
-                                         uint32_t size) {
-  (void)user;
-  memcpy(to, slots[slot] + offset, size);
-  return FLEXCOMP_STORAGE_DONE;
-}
-
-static flexcomp_storage_result slot_erase(void* user, unsigned slot) {
-  const uint32_t left = FLEXCOMP_SLOT_BYTES - erased_bytes;
-  const uint32_t size = left < ERASE_BYTES ? left : ERASE_BYTES;
-  (void)user;
-  memset(slots[slot] + erased_bytes, 0xFF, size);
-  erased_bytes += size;
-  if (erased_bytes != FLEXCOMP_SLOT_BYTES) return FLEXCOMP_STORAGE_BUSY;
-  erased_bytes = 0;
-  memset(written[slot], 0, sizeof written[slot]);
-  return FLEXCOMP_STORAGE_DONE;
-}
-
-static flexcomp_storage_result slot_write(void* user, unsigned slot, uint32_t offset, const uint8_t* from,
-                                          uint32_t size) {
-  (void)user;
-  if (offset % UNIT_BYTES != 0 || size % UNIT_BYTES != 0 || size > FLEXCOMP_SLOT_BYTES ||
-      offset > FLEXCOMP_SLOT_BYTES - size) {
-    return FLEXCOMP_STORAGE_FAILED;
-  }
-  for (uint32_t unit = offset / UNIT_BYTES; unit < (offset + size) / UNIT_BYTES; ++unit) {
-    /* Flash with a checksum per unit takes each of them once. */
-    if (written[slot][unit] != 0) return FLEXCOMP_STORAGE_FAILED;
-    written[slot][unit] = 1;
-  }
-  memcpy(slots[slot] + offset, from, size);
-  return FLEXCOMP_STORAGE_DONE;
-}
-
-const flexcomp_storage board_storage = {NULL, slot_read, slot_erase, slot_write};
+const flexcomp_storage* const board_storage = &flexcomp_slots_in_ram;

@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# The control cycle of the emulated Cortex-M7 controller, undisturbed by whatever its bus does (cycle.py).
-set -eu
-here=$(dirname "$0")
-. "$here/host_programs.sh"
-work=$(mktemp -d)
-trap 'rm -rf -- "$work"' EXIT
-"$FLEXCOMP_SOURCE_DIR"/hil/emulators/cortex-m7-modbus --image "$FLEXCOMP_IMAGE" --seconds 270 --shift 4 \
-  /usr/bin/python3 "$here/cycle.py" "$work" 4
+# The control cycle of the emulated Cortex-M7, undisturbed by whatever its bus does (cortex_m7_cycle.py).
+. "${BASH_SOURCE[0]%/*}/common.sh"
+shift_count=${1:-4}
+for kind in identified many-effects; do
+  "$hil/emulators/cortex-m7-modbus" --image "$FLEXCOMP_IMAGE" --seconds 280 --shift "$shift_count" \
+    /usr/bin/python3 "$here/cortex_m7_cycle.py" "$work" "$shift_count" "$kind"
+done

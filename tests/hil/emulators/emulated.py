@@ -1,4 +1,5 @@
-"""What the tests of an emulated controller share: its console and a Modbus master of their own."""
+"""What the tests of emulated controllers share: the bench that buses.py needs around a controller that runs already;
+of the Cortex-M7 also its console, and a Modbus master of their own."""
 import json
 import os
 import select
@@ -7,11 +8,21 @@ import struct
 import sys
 import time
 
-sys.path.insert(0, os.path.join(os.environ["FLEXCOMP_SOURCE_DIR"], "tests", "hil"))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+import buses  # noqa: E402
 from buses import check  # noqa: E402
 
-# How long an answer may take on a machine that is busy with something else.
+# How long something may take that takes milliseconds, on a machine that is busy with something else.
 PATIENCE = 30.0
+
+
+class Bench(buses.Bench):
+    """A controller that somebody else has started, on one bus."""
+
+    def __init__(self, work, bus, address):
+        self.work = work
+        self.buses = [bus]
+        self.address = {bus: address}
 
 
 class Console:

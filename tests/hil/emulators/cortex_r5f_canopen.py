@@ -1,8 +1,8 @@
 """The firmware in an emulated Cortex-R5F, on its emulated CAN controller, judged on vcan0.
 
-    judge.py prepare WORK   files, and what compensate answers to them; needs no bus
-    judge.py run WORK       the checks; frames.log, by candump since before the emulator started, is in WORK
-    judge.py frames WORK    what tshark makes of the frames; needs no bus
+    cortex_r5f_canopen.py prepare WORK   files, and what compensate answers to them; needs no bus
+    cortex_r5f_canopen.py run WORK       the checks; frames.log, by candump since before the emulator started, is in WORK
+    cortex_r5f_canopen.py frames WORK    what tshark makes of the frames; needs no bus
 
 What every CANopen controller must do is checked as for flexcomp-controller, by tests/hil/buses.py. Every check prints
 a line; the first one that fails ends the run.
@@ -16,7 +16,8 @@ import subprocess
 import sys
 import time
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+from emulated import PATIENCE, Bench
+
 import buses
 from buses import check, check_equal, flexcomp, passed, read, set_of, write
 
@@ -24,20 +25,7 @@ buses.NODE = NODE = 1
 buses.TARGETS = 80
 AT = f"can:vcan0:{NODE}"
 HEARTBEAT, REQUEST, ANSWER = 0x700 + NODE, 0x600 + NODE, 0x580 + NODE
-# How long something may take that takes milliseconds, when the machine has other things to do.
-PATIENCE = 30.0
 EXAMPLE = f"{buses.SOURCE}/firmware/examples/canopen_controller.c"
-
-
-class Emulated:
-    """What buses.py needs to know about a controller that somebody else has started."""
-
-    def __init__(self, work):
-        self.work = work
-        self.buses = ["can"]
-        self.address = {"can": AT}
-
-    status = buses.Bench.status
 
 
 def prepare(work):
@@ -315,7 +303,7 @@ def frames(work):
 
 def run(work):
     import can
-    bench = Emulated(work)
+    bench = Bench(work, "can", AT)
     first_words(work)
     fresh = bench.status("can")
     check(fresh["faults"] == ["no_valid_set"] and fresh["active"]["sequence"] == 0, "a fresh controller has no set")

@@ -1,7 +1,7 @@
-/* What the examples ask of a board: a clock, a control cycle, two serial lines, memory that keeps two slots.
- * A board of yours implements these few functions; firmware/boards/mps2-an500/board.c is one. */
-#ifndef FLEXCOMP_EXAMPLES_BOARD_H
-#define FLEXCOMP_EXAMPLES_BOARD_H
+/* What modbus_rtu_controller.c asks of a board: a clock, a control cycle, two serial lines, memory that keeps two slots.
+ * Bind it to your own drivers, or see firmware/boards/mps2-an500/ for one that is there. */
+#ifndef FLEXCOMP_EXAMPLES_MODBUS_RTU_BOARD_H
+#define FLEXCOMP_EXAMPLES_MODBUS_RTU_BOARD_H
 
 #include <flexcomp.h>
 
@@ -38,8 +38,8 @@ void board_send(unsigned line, const uint8_t* bytes, size_t size);
 /* Silence after which the bus is taken as back in step, us; see flexcomp_rtu_init. */
 uint32_t board_bus_gap_us(void);
 
-/* Two slots for parameter sets. */
-extern const flexcomp_storage board_storage;
+/* The two slots of non-volatile memory. */
+extern const flexcomp_storage* const board_storage;
 
 #ifdef __cplusplus
 }

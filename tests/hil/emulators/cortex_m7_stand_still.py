@@ -1,7 +1,7 @@
 """Stops the emulated controller's arm at some poses of its path; what its control cycle was told and what it gives
 to the drives there, as two files of joint angles.
 
-    stand_still.py COMMANDS.csv CORRECTED.csv      inside hil/emulators/cortex-m7-modbus
+    cortex_m7_stand_still.py COMMANDS.csv CORRECTED.csv      inside hil/emulators/cortex-m7-modbus
 """
 import math
 import sys

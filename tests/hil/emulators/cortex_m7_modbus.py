@@ -1,6 +1,6 @@
 """The emulated controller on its serial line, asked by our own client and by programs that nobody here wrote.
 
-    modbus_rtu.py WORK      inside hil/emulators/cortex-m7-modbus; WORK as `buses.py prepare` leaves it
+    cortex_m7_modbus.py WORK      inside hil/emulators/cortex-m7-modbus; WORK as `buses.py prepare` leaves it
 """
 import os
 import re
@@ -8,21 +8,12 @@ import struct
 import subprocess
 import sys
 
-from emulated import Console, Master
+from emulated import Bench, Console, Master
 
 import buses
 from buses import check, check_equal, flexcomp, passed, read
 
 UNIT, BAUD = 1, 115200
-
-
-class Bench(buses.Bench):
-    """What buses.on_one_bus needs, around a controller that runs already."""
-
-    def __init__(self, work):
-        self.work = work
-        self.buses = ["modbus-rtu"]
-        self.address = {"modbus-rtu": os.environ["FLEXCOMP_BUS"]}
 
 
 def words(registers):
@@ -115,8 +106,8 @@ def unknown_function():
 
 
 def main(work):
-    bench, console = Bench(work), Console()
-    bus = bench.address["modbus-rtu"]
+    bus = os.environ["FLEXCOMP_BUS"]
+    bench, console = Bench(work, "modbus-rtu", bus), Console()
     fresh = bench.status("modbus-rtu")
     check(fresh["faults"] == ["no_valid_set"] and fresh["active"]["sequence"] == 0, "a fresh controller has no set")
     flexcomp("probe", "--at", bus, "--targets", f"{work}/few.csv", "-o", f"{work}/probed.csv")
