@@ -45,6 +45,14 @@ struct Slots {
   std::array<S, 6> base{};
   std::array<S, 6> tool{};
   std::array<S, 3> point{};
+
+  /// In place: a temporary of this size has no room on a controller's stack.
+  void clear() {
+    for (std::array<S, 6>& values : link) values.fill(S(0));
+    base.fill(S(0));
+    tool.fill(S(0));
+    point.fill(S(0));
+  }
 };
 
 /// Scratch of one evaluation. Nothing in it needs to be set by the caller.
@@ -361,7 +369,7 @@ inline Pose<S> evaluate(const Model<S, N, Cap>& model, const Context<S, N>& cont
     unloaded_pass(model, ws);
     take_load(model, context, ws);
   }
-  ws.slots = Slots<S, N>();
+  ws.slots.clear();
   for (std::size_t k = 0; k < model.effect_count(); ++k) {
     const Term<S>& term = model.effect(k);
     const S value = term.coefficient * basis_value(model, term, context, ws);
