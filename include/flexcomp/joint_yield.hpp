@@ -391,6 +391,36 @@ inline void add_own_yield(const Model<S, N, Cap>& model, const Term<S>& term, co
   }
 }
 
+/// What turns joints without frames and not by their own reading alone.
+template <class S, std::size_t N, class Cap>
+inline void add_other_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+                            const Context<S, N>& context, std::array<S, N>& yield) {
+  for (std::size_t k = 0; k < model.other_count(); ++k) {
+    const Term<S>& term = model.other_term(k);
+    yield[term.place.body - 1U] += term.coefficient * plain_basis_value(model, term, context, q);
+  }
+}
+
+/// Takes the terms of Model::own_term() off the readings q: x + own(x) = q by Newton's method, with the curvature.
+template <class S, std::size_t N, class Cap>
+inline void take_own_yield(const Model<S, N, Cap>& model, const Context<S, N>& context, std::array<S, N>& q,
+                           std::array<S, N>& dq, std::array<S, N>& share) {
+  std::array<Local<S>, N> own;
+  for (Local<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
+  for (std::size_t k = 0; k < model.own_count(); ++k) {
+    const Term<S>& term = model.own_term(k);
+    add_own_yield(model, term, q[term.joint], context, own[term.joint]);
+  }
+  for (std::size_t i = 0; i < N; ++i) {
+    const S w = S(1) / (S(1) + own[i].slope);
+    const S newton = own[i].value * w;
+    const S step = newton + own[i].half_curvature * newton * newton * w;
+    share[i] = w;
+    q[i] -= step;
+    dq[i] -= step;
+  }
+}
+
 }  // namespace detail
 }  // namespace flexcomp
 

@@ -1,6 +1,6 @@
 /// \file
-/// The chain with its constant terms alone, as the control cycle needs it: axes and origins of the joints and the
-/// flange, written out in scalars so that a link stays in the processor's registers.
+/// The chain with its constant terms alone, as the control cycle needs it: sines and cosines, axes and origins of the
+/// joints and the flange, small motions of them; written out in scalars so that a link stays in the processor's registers.
 #ifndef FLEXCOMP_RIGID_CHAIN_HPP
 #define FLEXCOMP_RIGID_CHAIN_HPP
 
@@ -144,6 +144,123 @@ inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCo
   }
   out.linear = {vx, vy, vz};
   out.angular = {wx, wy, wz};
+}
+
+/// sin(angle) * axis of the rotation that turns `from` into `to` (columns), in the outer frame; exact to third
+/// order.
+template <class S>
+inline void rotation_error(const ThreeTriples<S>& to, const ThreeTriples<S>& from, Triple<S>& error) {
+  S x = from.a.y * to.a.z - from.a.z * to.a.y;
+  S y = from.a.z * to.a.x - from.a.x * to.a.z;
+  S z = from.a.x * to.a.y - from.a.y * to.a.x;
+  x += from.b.y * to.b.z;
+  x -= from.b.z * to.b.y;
+  y += from.b.z * to.b.x;
+  y -= from.b.x * to.b.z;
+  z += from.b.x * to.b.y;
+  z -= from.b.y * to.b.x;
+  x += from.c.y * to.c.z;
+  x -= from.c.z * to.c.y;
+  y += from.c.z * to.c.x;
+  y -= from.c.x * to.c.z;
+  z += from.c.x * to.c.y;
+  z -= from.c.y * to.c.x;
+  error.x = S(0.5) * x;
+  error.y = S(0.5) * y;
+  error.z = S(0.5) * z;
+}
+
+/// A point of the flange frame, in F0.
+template <class S>
+inline void flange_point(const FlangePose<S>& flange, const Vector3<S>& at, Triple<S>& point) {
+  const S x = at[0], y = at[1], z = at[2];
+  const ThreeTriples<S>& f = flange.axes;
+  point.x = flange.origin.x + (f.a.x * x + f.b.x * y + f.c.x * z);
+  point.y = flange.origin.y + (f.a.y * x + f.b.y * y + f.c.y * z);
+  point.z = flange.origin.z + (f.a.z * x + f.b.z * y + f.c.z * z);
+}
+
+/// How the tool point (m) and the rotation (rad) move when the joints of this chain turn by dq, to second order.
+template <class S, std::size_t N>
+inline void motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& tool,
+                   const std::array<S, N>& dq, Twist<S>& out) {
+  // From the flange inward: what the outer joints do is turned by the inner ones.
+  S px = tool.x, py = tool.y, pz = tool.z;
+  S wx = S(0), wy = S(0), wz = S(0);
+  for (std::size_t i = N; i-- > 0;) {
+    const JointAxis<S>& j = joint[i];
+    const S k = dq[i];
+    const S ax = j.axis.x * k, ay = j.axis.y * k, az = j.axis.z * k;
+    const S rx = px - j.origin.x, ry = py - j.origin.y, rz = pz - j.origin.z;
+    // p + a x r + a x (a x r) / 2
+    const S cx = ay * rz - az * ry, cy = az * rx - ax * rz, cz = ax * ry - ay * rx;
+    const S hx = S(0.5) * ax, hy = S(0.5) * ay, hz = S(0.5) * az;
+    px += cx;
+    px += hy * cz;
+    px -= hz * cy;
+    py += cy;
+    py += hz * cx;
+    py -= hx * cz;
+    pz += cz;
+    pz += hx * cy;
+    pz -= hy * cx;
+    // w + a + a x w / 2
+    const S ux = wx, uy = wy, uz = wz;
+    wx += ax;
+    wx += hy * uz;
+    wx -= hz * uy;
+    wy += ay;
+    wy += hz * ux;
+    wy -= hx * uz;
+    wz += az;
+    wz += hx * uy;
+    wz -= hy * ux;
+  }
+  const S vx = px - tool.x, vy = py - tool.y, vz = pz - tool.z;
+  out.linear = {vx, vy, vz};
+  out.angular = {wx, wy, wz};
+}
+
+template <class S, std::size_t N>
+inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
+                        std::array<SinCos<S>, N>& angle) {
+  for (std::size_t i = 0; i < N; ++i) {
+    S s, c;
+    sin_cos_kernel(q[i], s, c);
+    const S os = links[i].offset.s, oc = links[i].offset.c;
+    angle[i].s = s * oc + c * os;
+    angle[i].c = c * oc - s * os;
+  }
+}
+
+template <class S, std::size_t N>
+FLEXCOMP_ONCE void rotate_all_far(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
+  for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
+}
+
+/// Turns all angles; `square` is the sum of the squares. Without the last terms of rotate(): up to 1/64 rad they leave
+/// 1e-11.
+template <class S, std::size_t N>
+FLEXCOMP_ONCE void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
+  if (!(square < S(0.000244140625))) {
+    rotate_all_far(angle, by);
+    return;
+  }
+  for (std::size_t i = 0; i < N; ++i) {
+    const S d = by[i];
+    const S z = d * d;
+    const S sine = d - d * (z * S(1.0 / 6));
+    const S versine = z * (S(0.5) - z * S(1.0 / 24));
+    S s = angle[i].s, c = angle[i].c;
+    const S t = s;
+    s += c * sine;
+    s -= t * versine;
+    angle[i].s = s;
+    const S u = c;
+    c -= t * sine;
+    c -= u * versine;
+    angle[i].c = c;
+  }
 }
 
 }  // namespace detail
