@@ -102,8 +102,11 @@ class Model {
       gravity_[static_cast<int>(k)] = from_binary64<S>(robot.gravity_m_s2[k]);
     }
     for (std::size_t i = 0; i < N; ++i) {
+      // No wider than sines and cosines reach: a command beyond that is beyond its limit.
       lower_[i] = from_binary64<S>(robot.limits[i].min_rad);
       upper_[i] = from_binary64<S>(robot.limits[i].max_rad);
+      if (lower_[i] < -largest_angle<S>) lower_[i] = -largest_angle<S>;
+      if (upper_[i] > largest_angle<S>) upper_[i] = largest_angle<S>;
     }
     reference_temperature_ = from_binary64<S>(robot.reference_temperature_c);
     const double g0 = robot.gravity_m_s2[0];
@@ -275,7 +278,7 @@ class Model {
   /// True where every effect turns a joint (slot theta of a link) by the load's torque, the links' own weight, or
   /// something that needs no frames. Then the arm is a rigid chain behind yielding joints.
   bool only_joints_yield() const { return only_joints_yield_; }
-  /// True where the pose of a joint depends on where the load and the links are.
+  /// True where some effect follows the load's torque or a lever.
   bool yields_to_loads() const { return yields_to_loads_; }
   /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
   S compliance(std::size_t i) const { return compliance_[i]; }
@@ -376,7 +379,7 @@ class Model {
       }
       group_end_[g] = static_cast<Count>(n);
     }
-    yields_to_loads_ = summed_any || group_end_[other_loaded] != 0;
+    yields_to_loads_ = summed_any || group_end_[other_loaded] != 0;  // the levers are in this end as well
     const S g2 = dot<S>(gravity_, gravity_);
     using std::sqrt;
     inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);

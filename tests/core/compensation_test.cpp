@@ -500,6 +500,26 @@ TYPED_TEST(Refused, CommandsThatAreNotFiniteOrBeyondALimit) {
   }
 }
 
+// Wide limits are not a licence: sines and cosines are only exact so far.
+TYPED_TEST(Refused, AnglesThatNoSineReaches) {
+  using S = TypeParam;
+  const arms::Arm& arm = arms::all()[0];
+  arms::Robot robot = arm.robot;
+  for (flexcomp::JointLimits& l : robot.limits) l = {-1e12, 1e12};
+  Model<S> model;
+  ASSERT_EQ(model.prepare(robot, arms::as<S>(arms::table1(arm)).list()), flexcomp::Refusal::none);
+  const auto context = flexcomp::default_context<S>(robot);
+  for (const S bad : {std::nextafter(flexcomp::largest_angle<S>, S(1e9)), S(1e6), S(-1e6), S(9e11)}) {
+    std::array<S, 6> q{S(0.3), S(-0.4), S(1.2), S(0.5), S(-0.9), S(0.1)};
+    q[2] = bad;
+    const Compensated<S, 6> out = flexcomp::compensate(model, q, context);
+    EXPECT_EQ(out.status, StepStatus::refused) << bad;
+    EXPECT_EQ(std::memcmp(out.q.data(), q.data(), sizeof q), 0) << "passed through to the last bit";
+  }
+  std::array<S, 6> q{S(0.3), S(-0.4), S(1.2) + S(2 * flexcomp::pi) * S(100), S(0.5), S(-0.9), S(0.1)};
+  EXPECT_EQ(flexcomp::compensate(model, q, context).status, StepStatus::ok);
+}
+
 TYPED_TEST(Refused, ContextsThatAreNotFinite) {
   using S = TypeParam;
   const arms::Arm& arm = arms::all()[0];
