@@ -165,7 +165,7 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
   }
   rotate_all(angle, by, turned);
 
-  const bool loaded = model.yields_to_loads() || model.lever_count() != 0;
+  const bool loaded = model.yields_to_loads();
   const bool direct = model.own_count() + model.other_count() != 0;
   CarriedLoad<S> load;
   std::array<S, N> yield;
@@ -178,7 +178,7 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
   for (;; ++k) {
     rigid_pass(model.shapes(), angle, joints, flange);
     Triple<S> point;
-    flange_point(flange, model.tool_pose().position, point);
+    flange_point(flange, triple<S>(model.tool_pose().position), point);
     if (k == 1 && loaded) {
       if (load.is_plain) {
         around.set(model, q, joints, flange, load, yield);
@@ -325,6 +325,7 @@ inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, co
 }
 
 }  // namespace detail
+
 /// The joint command that brings the arm with all its terms to the pose that the nominal arm has at q_command
 /// (rad).
 ///
@@ -351,7 +352,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   detail::Corrector<S, N> corrector;
   detail::Aim<S> aim;
   detail::rigid_pass(model.nominals(), angle, corrector.joints(), aim.flange);
-  detail::flange_point(aim.flange, model.nominal_tool().position, aim.tool_point);
+  detail::flange_point(aim.flange, triple<S>(model.nominal_tool().position), aim.tool_point);
   corrector.set(aim.tool_point, settings);
   std::array<S, N> q;
   FLEXCOMP_UNROLL
@@ -394,6 +395,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   }
 }
 
+/// The same by value.
 template <class S, std::size_t N, class Cap>
 inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
                                     const Context<S, N>& context,

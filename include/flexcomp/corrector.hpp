@@ -41,12 +41,13 @@ template <class S>
 struct Symmetric {
   S xx, yy, zz, xy, xz, yz;
 
-  Triple<S> operator*(const Triple<S>& v) const {
-    return {xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z};
-  }
   Symmetric adjugate() const {
     return {yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy,
             xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz};
+  }
+  Symmetric over(const S& divisor) const {
+    const S k = S(1) / divisor;
+    return {xx * k, yy * k, zz * k, xy * k, xz * k, yz * k};
   }
 };
 
@@ -57,25 +58,14 @@ template <class S>
 inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings,
                            Symmetric<S>& inverse, S& regular) {
   // 1 / trace(A^-1) = det(A) / trace(adj(A)) needs no division by a vanishing determinant.
-  const S xx = a.yy * a.zz - a.yz * a.yz;
-  const S yy = a.xx * a.zz - a.xz * a.xz;
-  const S zz = a.xx * a.yy - a.xy * a.xy;
-  const S xy = a.xz * a.yz - a.xy * a.zz;
-  const S xz = a.xy * a.yz - a.xz * a.yy;
-  const S yz = a.xy * a.xz - a.xx * a.yz;
-  const S trace = xx + yy + zz;
-  const S determinant = a.xx * xx + a.xy * xy + a.xz * xz;
+  const Symmetric<S> b = a.adjugate();
+  const S trace = b.xx + b.yy + b.zz;
+  const S determinant = a.xx * b.xx + a.xy * b.xy + a.xz * b.xz;
   const S threshold = settings.singular_below * settings.singular_below;
   const S measure = trace > S(0) && determinant > S(0) ? determinant / trace : S(0);
   if (measure < regular) regular = measure;
   if (measure >= threshold) {
-    const S k = S(1) / determinant;
-    inverse.xx = xx * k;
-    inverse.yy = yy * k;
-    inverse.zz = zz * k;
-    inverse.xy = xy * k;
-    inverse.xz = xz * k;
-    inverse.yz = yz * k;
+    inverse = b.over(determinant);
     return;
   }
   const S lack = S(1) - measure / threshold;
@@ -84,9 +74,8 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
   d.xx += lambda;
   d.yy += lambda;
   d.zz += lambda;
-  const Symmetric<S> b = d.adjugate();
-  const S k = S(1) / (d.xx * b.xx + d.xy * b.xy + d.xz * b.xz);
-  inverse = {b.xx * k, b.yy * k, b.zz * k, b.xy * k, b.xz * k, b.yz * k};
+  const Symmetric<S> e = d.adjugate();
+  inverse = e.over(d.xx * e.xx + d.xy * e.xy + d.xz * e.xz);
 }
 
 /// Largest magnitude in a list; NaNs are skipped.

@@ -264,10 +264,6 @@ inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cel
   return upper + (lower - upper) * row.fraction;
 }
 
-}  // namespace detail
-
-namespace detail {
-
 /// basis_value() of the bases that need neither frames nor loads, at the readings q (rad). A curve's factor of torque is
 /// left to the caller.
 template <class S, std::size_t N, class Cap>

@@ -275,11 +275,9 @@ class YieldAround {
            std::array<S, N>& delta) {
     const S weight = load.gravity.z * load.mass_kg;
     weight_ = weight;
-    const ThreeTriples<S>& f = flange.axes;
-    const S cx = load.com_m.x, cy = load.com_m.y, cz = load.com_m.z;
-    const S ax = flange.origin.x + (f.a.x * cx + f.b.x * cy + f.c.x * cz);
-    const S ay = flange.origin.y + (f.a.y * cx + f.b.y * cy + f.c.y * cz);
-    const S az = flange.origin.z + (f.a.z * cx + f.b.z * cy + f.c.z * cz);
+    Triple<S> load_at;
+    flange_point(flange, load.com_m, load_at);
+    const S ax = load_at.x, ay = load_at.y, az = load_at.z;
     for (std::size_t i = 0; i < N; ++i) {
       const JointAxis<S>& j = joints[i];
       const S zx = j.axis.x, zy = j.axis.y, zz = j.axis.z;

@@ -172,8 +172,8 @@ inline void rotation_error(const ThreeTriples<S>& to, const ThreeTriples<S>& fro
 
 /// A point of the flange frame, in F0.
 template <class S>
-inline void flange_point(const FlangePose<S>& flange, const Vector3<S>& at, Triple<S>& point) {
-  const S x = at[0], y = at[1], z = at[2];
+inline void flange_point(const FlangePose<S>& flange, const Triple<S>& at, Triple<S>& point) {
+  const S x = at.x, y = at.y, z = at.z;
   const ThreeTriples<S>& f = flange.axes;
   point.x = flange.origin.x + (f.a.x * x + f.b.x * y + f.c.x * z);
   point.y = flange.origin.y + (f.a.y * x + f.b.y * y + f.c.y * z);
@@ -221,6 +221,7 @@ inline void motion(const std::array<JointAxis<S>, N>& joint, const Triple<S>& to
   out.angular = {wx, wy, wz};
 }
 
+/// Of the readings with the links' offsets. The readings lie within the limits of a Model, thus in the kernel's range.
 template <class S, std::size_t N>
 inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
                         std::array<SinCos<S>, N>& angle) {
