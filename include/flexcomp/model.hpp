@@ -105,8 +105,9 @@ class Model {
       // No wider than sines and cosines reach: a command beyond that is beyond its limit.
       lower_[i] = from_binary64<S>(robot.limits[i].min_rad);
       upper_[i] = from_binary64<S>(robot.limits[i].max_rad);
-      if (lower_[i] < -largest_angle<S>) lower_[i] = -largest_angle<S>;
-      if (upper_[i] > largest_angle<S>) upper_[i] = largest_angle<S>;
+      const S reach = LargestAngle<S>::value();
+      if (lower_[i] < -reach) lower_[i] = -reach;
+      if (upper_[i] > reach) upper_[i] = reach;
     }
     reference_temperature_ = from_binary64<S>(robot.reference_temperature_c);
     const double g0 = robot.gravity_m_s2[0];

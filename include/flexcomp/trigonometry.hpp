@@ -17,9 +17,13 @@ constexpr double pi = 3.14159265358979323846;
 
 /// The largest angle of sin_cos(), rad: what its range reduction is exact for.
 template <class S>
-constexpr S largest_angle = S(1e5);
+struct LargestAngle {
+  static S value() { return S(1e5); }
+};
 template <>
-constexpr float largest_angle<float> = 1e4F;
+struct LargestAngle<float> {
+  static constexpr float value() { return 1e4F; }
+};
 
 /// Sine and cosine of one angle (dimensionless).
 template <class S>
@@ -98,7 +102,7 @@ inline void sin_cos_kernel(float x, float& sine, float& cosine) {
 FLEXCOMP_ONCE inline SinCos<double> sin_cos(double x) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   SinCos<double> r{nan, nan};
-  if (x <= largest_angle<double> && x >= -largest_angle<double>) detail::sin_cos_kernel(x, r.s, r.c);
+  if (x <= 1e5 && x >= -1e5) detail::sin_cos_kernel(x, r.s, r.c);
   return r;
 }
 
@@ -108,7 +112,7 @@ FLEXCOMP_ONCE inline SinCos<double> sin_cos(double x) {
 FLEXCOMP_ONCE inline SinCos<float> sin_cos(float x) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   SinCos<float> r{nan, nan};
-  if (x <= largest_angle<float> && x >= -largest_angle<float>) detail::sin_cos_kernel(x, r.s, r.c);
+  if (x <= 1e4F && x >= -1e4F) detail::sin_cos_kernel(x, r.s, r.c);
   return r;
 }
 

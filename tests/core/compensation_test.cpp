@@ -509,7 +509,7 @@ TYPED_TEST(Refused, AnglesThatNoSineReaches) {
   Model<S> model;
   ASSERT_EQ(model.prepare(robot, arms::as<S>(arms::table1(arm)).list()), flexcomp::Refusal::none);
   const auto context = flexcomp::default_context<S>(robot);
-  for (const S bad : {std::nextafter(flexcomp::largest_angle<S>, S(1e9)), S(1e6), S(-1e6), S(9e11)}) {
+  for (const S bad : {std::nextafter(flexcomp::LargestAngle<S>::value(), S(1e9)), S(1e6), S(-1e6), S(9e11)}) {
     std::array<S, 6> q{S(0.3), S(-0.4), S(1.2), S(0.5), S(-0.9), S(0.1)};
     q[2] = bad;
     const Compensated<S, 6> out = flexcomp::compensate(model, q, context);
