@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -35,8 +36,11 @@ struct Identify {
   std::string frames;
   std::string out;
   std::string report;
+  std::vector<std::string> fix;
+  std::string tolerances;
   bool force = false;
   bool plain = false;
+  bool unbounded = false;
 
   void run() const;
 };
@@ -53,13 +57,73 @@ std::string in_degrees(const std::array<double, joint_count>& q) {
   return text;
 }
 
-/// Every identified number with its standard deviation, in the units of files.
-std::string parameter_table(const Identification& r, const RobotFile& robot) {
-  std::string text = fmt::format("  {:<44} {:>14} {:>12}\n", "parameter", "value", "+- (1 sigma)");
-  for (const Parameter& p : parameters_of(r.calibration.terms, robot.nominal)) {
-    const double sigma = r.calibration.sigma[p.terms.front()] / p.si_per_file_unit();
-    text += fmt::format("  {:<44} {:>14.6g} {:>12.2g}\n", p.name,
-                        p.get(r.calibration.terms) / p.si_per_file_unit(), sigma);
+/// `NAME` or `NAME=VALUE`, the value in the unit that the name ends with.
+FixedParameter fixed_parameter(const std::string& text, const RobotFile& robot) {
+  const std::size_t equals = text.rfind('=');
+  // joint_compliance[joint=2].rad_per_nm has an equals sign of its own.
+  const bool has_value = equals != std::string::npos && text.find(']', equals) == std::string::npos;
+  FixedParameter fixed{has_value ? text.substr(0, equals) : text, 0};
+  if (!has_value) return fixed;
+  for (const Parameter& p : paper_model(robot.nominal, ModelKind::full, true).parameters) {
+    if (p.name != fixed.name) continue;
+    const auto value = parse_si(text.substr(equals + 1), p.unit);
+    if (!value) throw InputError("--fix", 0, fixed.name, "a number", "'" + text.substr(equals + 1) + "'");
+    fixed.value_si = *value;
+  }
+  return fixed;  // identify() refuses a name that the model does not have
+}
+
+/// What is said of one fitted parameter, in the unit of files.
+struct Row {
+  std::string name;
+  double value = 0;
+  double sigma = 0;
+  double low = 0;
+  double high = 0;
+  bool at_bound = false;
+  /// Different from the nominal arm beyond chance: zero lies outside the 95 % interval.
+  bool significant() const { return low > 0 || high < 0; }
+};
+
+std::vector<Row> rows_of(const Identification& r) {
+  std::vector<Row> rows;
+  const Unknowns& fitted = r.known.fitted;
+  const Eigen::VectorXd units = units_of(fitted, r.fit.estimate.set);
+  for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
+    const Parameter& parameter = fitted.parameters[p];
+    const double unit = parameter.si_per_file_unit();
+    const Eigen::Index i = static_cast<Eigen::Index>(fitted.frames.size() + p);
+    rows.push_back({parameter.name, parameter.get(r.fit.estimate.set) / unit,
+                    std::sqrt(std::max(0.0, r.fit.covariance(i, i))) * units[i] / unit,
+                    r.fit.interval[p].low / unit, r.fit.interval[p].high / unit, r.fit.at_bound[p]});
+  }
+  return rows;
+}
+
+/// Every identified number with its standard deviation and interval, in the units of files.
+std::string parameter_table(const std::vector<Row>& rows) {
+  std::string text =
+      fmt::format("  {:<44} {:>14} {:>12}  {}\n", "parameter", "value", "+- (1 sigma)", "95 % interval");
+  for (const Row& row : rows) {
+    text += fmt::format("  {:<44} {:>14.6g} {:>12.2g}  {:.4g} … {:.4g}{}\n", row.name, row.value, row.sigma,
+                        row.low, row.high,
+                        row.at_bound        ? "  (one-sided: at its bound)"
+                        : row.significant() ? ""
+                                            : "  (may be none)");
+  }
+  return text;
+}
+
+std::string payload_advice(const std::vector<PayloadGain>& gains, const TermSet& set,
+                           const std::vector<Parameter>& parameters) {
+  std::string text =
+      "  All rows have one payload. Measuring every second pose without it would make known better:";
+  for (const PayloadGain& gain : gains) {
+    const auto p = std::find_if(parameters.begin(), parameters.end(),
+                                [&](const Parameter& q) { return q.name == gain.parameter; });
+    const double unit = p->si_per_file_unit();
+    text += fmt::format("\n    {:<44} +- {:.2g} instead of {:.2g} (value {:.2g})", gain.parameter,
+                        gain.sigma_with_both / unit, gain.sigma / unit, p->get(set) / unit);
   }
   return text;
 }
@@ -75,6 +139,9 @@ void Identify::run() const {
   options.force = force;
   options.seed = common.seed;
   options.estimator.robust = !plain;
+  options.physical = !unbounded;
+  for (const std::string& text : fix) options.fixed.push_back(fixed_parameter(text, robot_file));
+  if (!tolerances.empty()) options.tolerances = load_tolerances(tolerances);
   const Identification r = identify(robot_file, rows, data, options);
   if (!r.outliers.empty()) {
     std::string lines;
@@ -92,14 +159,15 @@ void Identify::run() const {
                          r.frame_parameters > 0
                              ? fmt::format(", and {} numbers of the frames", r.frame_parameters)
                              : std::string()));
-  for (const Confounded& c : r.confounded) {
+  for (const Confounded& c : r.known.confounded) {
     std::string with;
     for (const std::string& w : c.with) with += (with.empty() ? "" : ", ") + w;
     common.say(
         fmt::format("  {} cannot be known: {}", c.parameter,
                     with.empty() ? "nothing measured here depends on it" : "it is carried by " + with));
   }
-  common.say(parameter_table(r, robot_file));
+  const std::vector<Row> table = rows_of(r);
+  common.say(parameter_table(table));
   common.say(accuracy_table(r.before, r.after));
   common.say(
       fmt::format("  {} after {} steps; chi-square per degree of freedom {:.3g}; condition {:.3g}; O1 {:.3g}",
@@ -107,25 +175,38 @@ void Identify::run() const {
                   r.condition, r.o1));
   common.say(fmt::format("{}: written", out));
 
+  if (!r.known.payload_gains.empty())
+    common.say(payload_advice(r.known.payload_gains, r.fit.estimate.set, r.known.fitted.parameters));
+
   nlohmann::ordered_json parameters = nlohmann::ordered_json::array();
-  for (const Parameter& p : parameters_of(r.calibration.terms, robot_file.nominal)) {
-    parameters.push_back({{"name", p.name},
-                          {"value", p.get(r.calibration.terms) / p.si_per_file_unit()},
-                          {"sigma", r.calibration.sigma[p.terms.front()] / p.si_per_file_unit()}});
+  for (const Row& row : table) {
+    parameters.push_back({{"name", row.name},
+                          {"value", row.value},
+                          {"sigma", row.sigma},
+                          {"interval95", {row.low, row.high}},
+                          {"at_bound", row.at_bound},
+                          {"significant", row.significant()}});
   }
   nlohmann::ordered_json cure = nlohmann::ordered_json::array();
-  for (const auto& q : r.cure) {
+  nlohmann::ordered_json cure_payload = nlohmann::ordered_json::array();
+  for (const CuringPose& c : r.known.cure) {
     nlohmann::ordered_json pose = nlohmann::ordered_json::array();
-    for (const double v : q) pose.push_back(degrees(v));
+    for (const double v : c.q_rad) pose.push_back(degrees(v));
     cure.push_back(pose);
+    cure_payload.push_back(c.payload_kg);
   }
+  nlohmann::ordered_json gains = nlohmann::ordered_json::array();
+  for (const PayloadGain& gain : r.known.payload_gains)
+    gains.push_back({{"parameter", gain.parameter}, {"sigma_ratio", gain.sigma_with_both / gain.sigma}});
   std::vector<std::size_t> outlier_lines;
   for (const std::size_t k : r.outliers) outlier_lines.push_back(rows[k].line);
   common.write_json({{"parameters", r.parameters},
                      {"identifiable", r.identifiable},
-                     {"confounded", confounded_json(r.confounded)},
-                     {"missing", r.missing},
+                     {"confounded", confounded_json(r.known.confounded)},
+                     {"missing", r.known.missing},
                      {"cure_deg", cure},
+                     {"cure_payload_kg", cure_payload},
+                     {"second_payload_gains", gains},
                      {"frame_parameters", r.frame_parameters},
                      {"poses", rows.size()},
                      {"condition", r.condition},
@@ -145,9 +226,11 @@ void Identify::run() const {
   }
   if (r.doubts.empty()) return;
   std::string message = joined(r.doubts);
-  if (!r.cure.empty()) {
-    message += fmt::format("\n  These {} poses (joint readings in degrees) would cure it:", r.cure.size());
-    for (const auto& q : r.cure) message += "\n   " + in_degrees(q);
+  if (!r.known.cure.empty()) {
+    message += fmt::format("\n  These {} poses (joint readings in degrees, payload) would cure it:",
+                           r.known.cure.size());
+    for (const CuringPose& c : r.known.cure)
+      message += fmt::format("\n   {}  {:.3f} kg", in_degrees(c.q_rad), c.payload_kg);
   }
   throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, message));
 }
@@ -179,6 +262,23 @@ void add_identify(CLI::App& app) {
                    "fit where the nominal frames are off by more than 20 mm or 2 degrees")
       ->check(CLI::IsMember(frame_choices));
   command->add_option("-o,--output", options->out, "Calibration file")->type_name("CAL.yaml")->required();
+  command
+      ->add_option(
+          "--fix", options->fix,
+          "Do not fit this parameter, it is known: NAME (zero) or NAME=VALUE in the unit that the name "
+          "ends with; may be given again")
+      ->type_name("NAME[=VALUE]")
+      ->allow_extra_args(false);
+  command
+      ->add_option(
+          "--tolerances", options->tolerances,
+          "How far from the drawing parameters may be, used as prior knowledge. A file with "
+          "`tolerances:` and per line NAME: SIGMA, or NAME: {expected: VALUE, sigma: SIGMA}, in the unit "
+          "that the name ends with; * stands for any text (link*.d_mm: 0.2)")
+      ->type_name("T.yaml");
+  command->add_flag(
+      "--unbounded", options->unbounded,
+      "Compliances may come out negative (default: as small as zero, with a one-sided interval)");
   command->add_flag("--plain", options->plain, "Every row counts in full: no protection from outliers");
   command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
   add_force_option(*command, options->force);

@@ -347,6 +347,12 @@ void read_head(const YamlField& root, const RobotFile& robot, Calibration& c) {
       c.confounded.push_back(std::move(confounded));
     }
   }
+  if (const auto field = root.find("at_bound")) {
+    for (const YamlField& entry : field->items()) {
+      entry.require_keys({"parameter", "upper_95_si"});
+      c.at_bound.push_back({entry.at("parameter").text(), entry.at("upper_95_si").number(unit::si)});
+    }
+  }
   if (const auto field = root.find("residuals")) {
     for (const std::string& key : field->keys())
       c.residuals.emplace_back(key, field->at(key).number(unit::si));
@@ -491,7 +497,7 @@ void stamp(Calibration& calibration, const RobotFile& robot) {
 Calibration load_calibration(const std::string& path, const RobotFile& robot) {
   const YamlField root = YamlField::load(path);
   root.require_keys({"robot", "nominal_hash", "flexcomp_version", "date", "sequence", "frames", "geometric",
-                     "base", "tool", "effects", "confounded", "residuals", "covariance_factor"});
+                     "base", "tool", "effects", "confounded", "at_bound", "residuals", "covariance_factor"});
   Calibration calibration;
   calibration.path = path;
   read_head(root, robot, calibration);
@@ -535,6 +541,11 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
     std::vector<std::string> with;
     for (const std::string& other : confounded.with) with.push_back(quoted(other));
     text += fmt::format("  - {{parameter: {}, with: {}}}\n", quoted(confounded.parameter), list_text(with));
+  }
+  if (!c.at_bound.empty()) text += "at_bound:  # as small as physics allows; 95 % sure to be below (SI)\n";
+  for (const AtBound& bound : c.at_bound) {
+    text += fmt::format("  - {{parameter: {}, upper_95_si: {}}}\n", quoted(bound.parameter),
+                        sigma_number(bound.upper_95, unit::si));
   }
   if (!c.residuals.empty()) text += "residuals:\n";
   for (const auto& [key, value] : c.residuals)

@@ -39,6 +39,12 @@ struct Confounded {
   std::vector<std::string> with;  ///< and is carried by these
 };
 
+/// A parameter whose estimate is the least that physics allows (a compliance of zero).
+struct AtBound {
+  std::string parameter;
+  double upper_95 = 0;  ///< SI: end of the one-sided 95 % interval
+};
+
 /// Joint uncertainty of all that was fitted (frames first): covariance = factor * factor^T, SI. The standard deviations
 /// alone would not do: what two near-confounded parameters lack in common cancels in the pose that they predict.
 struct CovarianceFactor {
@@ -57,6 +63,7 @@ struct Calibration {
   std::optional<MeasurementFrames> frames;  ///< where fitted; the base is then not pushed
   std::optional<CovarianceFactor> covariance;
   std::vector<Confounded> confounded;
+  std::vector<AtBound> at_bound;
   std::vector<std::pair<std::string, double>> residuals;  ///< by name with unit, e.g. after_mean_mm
   std::string tool_version;
   std::string date;  ///< ISO 8601

@@ -36,7 +36,8 @@ class YamlField {
   bool has(const std::string& key) const { return find(key).has_value(); }
   std::optional<YamlField> find(const std::string& key) const;
   YamlField at(const std::string& key) const;  ///< \throws InputError where the key is missing
-  std::vector<std::string> keys() const;       ///< of a mapping, in the order of the file
+  bool is_mapping() const { return node_.IsMap(); }
+  std::vector<std::string> keys() const;  ///< of a mapping, in the order of the file
 
   /// A sequence; items are named from 1, as joints and links are (joints[3] is joint 3). \throws InputError
   std::vector<YamlField> items() const;

@@ -3,7 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <memory>
 
 namespace flexcomp::host {
 
@@ -52,6 +54,191 @@ RobustWeights weigh(const Eigen::VectorXd& square, const std::vector<Observation
   return out;
 }
 
+/// Linearised cost around an estimate, dx in units_of(): normal * dx = gradient at its minimum.
+struct Quadratic {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd gradient;
+  Eigen::VectorXd least;  ///< of dx; minus infinity where nothing bounds it
+
+  /// What a step gains in chi-square, as far as the cost is quadratic.
+  double gain(const Eigen::VectorXd& dx) const {
+    return 2 * gradient.dot(dx) - dx.dot(normal.selfadjointView<Eigen::Lower>() * dx);
+  }
+};
+
+/// Minimum within the bounds by an active set. Few parameters are bounded, so this ends after a few rounds; the limit is
+/// there for rounding that keeps one on the edge.
+Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
+  const Eigen::Index n = q.gradient.size();
+  Eigen::MatrixXd damped = q.normal;
+  damped.diagonal().array() += mu;
+  Eigen::VectorXd dx = damped.ldlt().solve(q.gradient);
+  if ((dx.array() >= q.least.array()).all()) return dx;
+  std::vector<bool> held(static_cast<std::size_t>(n), false);
+  damped = damped.selfadjointView<Eigen::Lower>();
+  for (int round = 0; round < 100; ++round) {
+    bool settled = true;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (held[static_cast<std::size_t>(i)] || dx[i] >= q.least[i]) continue;
+      held[static_cast<std::size_t>(i)] = true;
+      settled = false;
+    }
+    if (settled) {
+      // A bound that pushes into the allowed side holds nothing back: let the worst one go.
+      Eigen::Index release = n;
+      double worst = 0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        if (!held[static_cast<std::size_t>(i)]) continue;
+        const double push = (q.gradient[i] - damped.row(i).dot(dx)) / std::sqrt(damped(i, i));
+        if (push > worst + 1e-12) {
+          worst = push;
+          release = i;
+        }
+      }
+      if (release == n) break;
+      held[static_cast<std::size_t>(release)] = false;
+    }
+    Eigen::MatrixXd reduced = damped;
+    Eigen::VectorXd right = q.gradient;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (!held[static_cast<std::size_t>(i)]) continue;
+      right -= damped.col(i) * q.least[i];
+    }
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (!held[static_cast<std::size_t>(i)]) continue;
+      reduced.row(i).setZero();
+      reduced.col(i).setZero();
+      reduced(i, i) = 1;
+      right[i] = q.least[i];
+    }
+    dx = reduced.ldlt().solve(right);
+  }
+  return dx.cwiseMax(q.least);
+}
+
+/// One state of the descent: an estimate with its residuals, their derivative and their squares per row.
+struct Point {
+  Estimate estimate;
+  Linearised lin;
+  Eigen::VectorXd square;
+};
+
+class Descent {
+ public:
+  Descent(const Unknowns& unknowns, const std::vector<Observation>& rows, const RobotFile& robot,
+          const TermSet& set)
+      : unknowns_(unknowns), rows_(rows), robot_(robot), units_(units_of(unknowns, set)) {
+    const Eigen::Index n = static_cast<Eigen::Index>(unknowns.count());
+    precision_ = expected_ = Eigen::VectorXd::Zero(n);
+    least_ = Eigen::VectorXd::Constant(n, -std::numeric_limits<double>::infinity());
+    const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
+    for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
+      const PriorKnowledge prior = unknowns.prior_of(p);
+      const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
+      least_[i] = prior.least / units_[i];
+      expected_[i] = prior.expected / units_[i];
+      if (std::isfinite(prior.tolerance)) precision_[i] = std::pow(units_[i] / prior.tolerance, 2);
+    }
+  }
+
+  Point at(Estimate estimate) const {
+    Point point;
+    const auto model = prepare(estimate.set, robot_, "identification");
+    point.lin = linearised(estimate, *model, rows_, unknowns_);
+    point.square = squares(point.lin.residual);
+    point.estimate = std::move(estimate);
+    return point;
+  }
+
+  double cost(const Point& point, const std::vector<double>& weight) const {
+    double sum = (values(point.estimate) - expected_).cwiseAbs2().dot(precision_);
+    for (std::size_t k = 0; k < rows_.size(); ++k)
+      sum += weight[k] * point.square[static_cast<Eigen::Index>(k)];
+    return sum;
+  }
+
+  Quadratic quadratic(const Point& point, const std::vector<double>& weight) const {
+    const Eigen::Index n = static_cast<Eigen::Index>(unknowns_.count());
+    Quadratic q{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), least_ - values(point.estimate)};
+    if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 1; })) {
+      q.normal.selfadjointView<Eigen::Lower>().rankUpdate(point.lin.derivative.transpose());
+      q.gradient = point.lin.derivative.transpose() * point.lin.residual;
+    } else {
+      Eigen::VectorXd root(point.lin.residual.size());
+      for (std::size_t k = 0; k < rows_.size(); ++k)
+        root.segment<6>(6 * static_cast<Eigen::Index>(k)).setConstant(std::sqrt(weight[k]));
+      const Eigen::MatrixXd weighted = root.asDiagonal() * point.lin.derivative;
+      q.normal.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
+      q.gradient = weighted.transpose() * root.cwiseProduct(point.lin.residual);
+    }
+    q.normal.diagonal() += precision_;
+    q.gradient += precision_.cwiseProduct(expected_ - values(point.estimate));
+    return q;
+  }
+
+  Point moved(const Point& from, const Eigen::VectorXd& dx) const {
+    Estimate estimate = from.estimate;
+    move(estimate, unknowns_, dx);
+    // What the step put on a bound lies on it, not a rounding beside it.
+    for (std::size_t p = 0; p < unknowns_.parameters.size(); ++p) {
+      const double least = unknowns_.prior_of(p).least;
+      if (unknowns_.parameters[p].get(estimate.set) < least) unknowns_.parameters[p].set(estimate.set, least);
+    }
+    return at(std::move(estimate));
+  }
+
+  bool on_bound(const Estimate& estimate, std::size_t parameter) const {
+    const double least = unknowns_.prior_of(parameter).least;
+    const Eigen::Index i = static_cast<Eigen::Index>(unknowns_.frames.size() + parameter);
+    return unknowns_.parameters[parameter].get(estimate.set) - least < 1e-9 * units_[i];
+  }
+
+  double unit(Eigen::Index i) const { return units_[i]; }
+
+ private:
+  /// In units; of the frames, which have no prior, zero.
+  Eigen::VectorXd values(const Estimate& estimate) const {
+    Eigen::VectorXd v = Eigen::VectorXd::Zero(units_.size());
+    const Eigen::Index frames = static_cast<Eigen::Index>(unknowns_.frames.size());
+    for (std::size_t p = 0; p < unknowns_.parameters.size(); ++p) {
+      const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
+      v[i] = unknowns_.parameters[p].get(estimate.set) / units_[i];
+    }
+    return v;
+  }
+
+  const Unknowns& unknowns_;
+  const std::vector<Observation>& rows_;
+  const RobotFile& robot_;
+  Eigen::VectorXd units_;
+  Eigen::VectorXd precision_;  // of the priors
+  Eigen::VectorXd expected_;
+  Eigen::VectorXd least_;
+};
+
+/// 95 % of a normal distribution above `least`: symmetric in probability, or from `least` up.
+Interval allowed_interval(double mean, double sigma, double least, bool from_the_bound) {
+  const boost::math::normal standard;
+  if (!(sigma > 0)) return {mean, mean};
+  // Share of the distribution that is allowed; upper tails, because a mean far below the bound leaves 1e-20 of it.
+  const double allowed = boost::math::cdf(boost::math::complement(standard, (least - mean) / sigma));
+  const auto with_above = [&](double tail) {
+    const double p = std::max(allowed * tail, 1e-300);
+    return std::max(least, mean + sigma * boost::math::quantile(boost::math::complement(standard, p)));
+  };
+  if (from_the_bound) return {least, with_above(0.05)};
+  return {with_above(0.975), with_above(0.025)};
+}
+
+/// Schur complement of the frames: what the data know of the parameters whatever the frames are.
+Eigen::MatrixXd without_frames(const Eigen::MatrixXd& normal, Eigen::Index frames) {
+  const Eigen::Index parameters = normal.cols() - frames;
+  if (frames == 0) return normal;
+  return normal.bottomRightCorner(parameters, parameters) -
+         normal.bottomLeftCorner(parameters, frames) *
+             normal.topLeftCorner(frames, frames).ldlt().solve(normal.topRightCorner(frames, parameters));
+}
+
 }  // namespace
 
 double chi2_quantile(double probability, double degrees_of_freedom) {
@@ -61,96 +248,59 @@ double chi2_quantile(double probability, double degrees_of_freedom) {
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const RobotFile& robot, const EstimatorOptions& options) {
   Fit out;
-  out.estimate = start;
-  const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
-  auto model = prepare(out.estimate.set, robot, "identification");
-  Linearised lin = linearised(out.estimate, *model, rows, unknowns);
-  Eigen::VectorXd square = squares(lin.residual);
+  const Descent descent(unknowns, rows, robot, start.set);
+  Point point = descent.at(start);
   RobustWeights robust;
   robust.weight.assign(rows.size(), 1.0);
-
-  const auto weighted_cost = [&](const Eigen::VectorXd& s) {
-    double sum = 0;
-    for (std::size_t k = 0; k < rows.size(); ++k) sum += robust.weight[k] * s[static_cast<Eigen::Index>(k)];
-    return sum;
-  };
-  Eigen::MatrixXd normal(columns, columns);
-  Eigen::VectorXd gradient(columns);
-  const auto normal_equations = [&]() {
-    Eigen::VectorXd weight(lin.residual.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      weight.segment<6>(6 * static_cast<Eigen::Index>(k)).setConstant(robust.weight[k]);
-    }
-    const Eigen::MatrixXd weighted = weight.asDiagonal() * lin.derivative;
-    normal.setZero();
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(
-        Eigen::MatrixXd(weight.cwiseSqrt().asDiagonal() * lin.derivative).transpose());
-    normal = normal.selfadjointView<Eigen::Lower>();
-    gradient = weighted.transpose() * lin.residual;
-  };
-
-  double mu = 0;
-  // Outer rounds: weights are held while the fit converges, then taken afresh until they settle.
-  for (int round = 0; round < 30; ++round) {
-    double cost = weighted_cost(square);
-    normal_equations();
-    if (mu == 0) mu = 1e-3 * normal.diagonal().mean();
-    bool settled = false;
-    for (int trial = 0; trial < options.largest_iterations && !settled; ++trial) {
-      // What the undamped step would gain is the proof of convergence: the gradient in the metric of the problem.
-      const Eigen::VectorXd newton = normal.ldlt().solve(gradient);
-      out.newton_decrement = gradient.dot(newton);
-      if (out.newton_decrement < 1e-9 * std::max(1.0, robust.scale * robust.scale)) {
-        settled = true;
-        break;
-      }
-      Eigen::MatrixXd damped = normal;
-      damped.diagonal().array() += mu;
-      const Eigen::VectorXd dx = damped.ldlt().solve(gradient);
-      Estimate trial_estimate = out.estimate;
-      move(trial_estimate, unknowns, dx);
-      auto trial_model = prepare(trial_estimate.set, robot, "identification");
-      Linearised trial_lin = linearised(trial_estimate, *trial_model, rows, unknowns);
-      const Eigen::VectorXd trial_square = squares(trial_lin.residual);
-      const double trial_cost = weighted_cost(trial_square);
-      const double ratio = std::sqrt(trial_cost / cost);
-      if (trial_cost < cost) {
-        // Eq. 37 with its cases the right way round: success lowers the damping, by the ratio of the norms besides.
-        mu = mu / options.upsilon * ratio;
-        out.estimate = std::move(trial_estimate);
-        lin = std::move(trial_lin);
-        square = trial_square;
-        ++out.iterations;
-        if (options.progress) options.progress(out.iterations, trial_cost);
-        const bool rounding = cost - trial_cost < 1e-13 * cost;
-        cost = trial_cost;
-        normal_equations();
-        if (rounding) settled = true;
-      } else if (trial_cost <= cost * (1 + 1e-13)) {
-        settled = true;  // at the rounding of the cost itself; the decrement below judges
-      } else {
-        mu *= options.upsilon;
-        if (mu > 1e30) break;
-      }
-    }
-    if (!options.robust) break;
-    const std::vector<double> before = robust.weight;
-    robust = weigh(square, rows, unknowns.count());
+  Quadratic quadratic = descent.quadratic(point, robust.weight);
+  // From weights to weights until they settle; a step in which they changed proves nothing.
+  const auto weigh_again = [&]() {
+    if (!options.robust) return false;
+    RobustWeights fresh = weigh(point.square, rows, unknowns.count());
     double change = 0;
     for (std::size_t k = 0; k < rows.size(); ++k)
-      change = std::max(change, std::abs(robust.weight[k] - before[k]));
-    if (change < 1e-6) break;
-  }
-  normal_equations();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  out.newton_decrement = gradient.dot(factor.solve(gradient));
+      change = std::max(change, std::abs(fresh.weight[k] - robust.weight[k]));
+    robust = std::move(fresh);
+    if (change > 0) quadratic = descent.quadratic(point, robust.weight);
+    return change > 1e-6;
+  };
 
+  // A start that is nearly right, as a drawing is, needs nearly no damping: the model is linear but for 1e-3.
+  double mu = 1e-7 * quadratic.normal.diagonal().mean();
+  for (int trial = 0; trial < options.largest_iterations; ++trial) {
+    // What the undamped step would gain is the proof of convergence: the gradient in the metric of the problem.
+    const Eigen::VectorXd newton = bounded_step(quadratic, 0);
+    out.newton_decrement = quadratic.gain(newton);
+    const double bulk = std::max(1.0, robust.scale * robust.scale);
+    // Near the minimum the residuals are noise, and say which rows are not.
+    if (out.newton_decrement < 10 * bulk && weigh_again()) continue;
+    if (out.newton_decrement < 1e-9 * bulk) break;
+    Point next = descent.moved(point, bounded_step(quadratic, mu));
+    const double cost = descent.cost(point, robust.weight);
+    const double next_cost = descent.cost(next, robust.weight);
+    if (next_cost < cost) {
+      // Eq. 37 with its cases the right way round: success lowers the damping, by the ratio of the norms besides.
+      mu = mu / options.upsilon * std::sqrt(next_cost / cost);
+      point = std::move(next);
+      ++out.iterations;
+      if (options.progress) options.progress(out.iterations, next_cost);
+      quadratic = descent.quadratic(point, robust.weight);
+      if (cost - next_cost < 1e-13 * cost) break;
+    } else {
+      if (next_cost <= cost * (1 + 1e-13)) break;  // at the rounding of the cost itself; the decrement judges
+      mu = std::max(mu, 1e-12 * quadratic.normal.diagonal().mean()) * options.upsilon;
+      if (mu > 1e30) break;
+    }
+  }
+  out.newton_decrement = quadratic.gain(bounded_step(quadratic, 0));
+
+  out.estimate = point.estimate;
   out.weight = robust.weight;
   out.scale = robust.scale;
   double measured = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (out.weight[k] < 1) continue;
-    out.chi2 += square[static_cast<Eigen::Index>(k)];
+    out.chi2 += point.square[static_cast<Eigen::Index>(k)];
     measured += dimensions(rows[k]);
   }
   out.degrees_of_freedom = measured - static_cast<double>(unknowns.count());
@@ -158,20 +308,27 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
   out.converged = std::isfinite(out.newton_decrement) &&
                   std::abs(out.newton_decrement) < 1e-8 * std::max(1.0, out.scale * out.scale);
 
+  const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
+  const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
+  const Eigen::MatrixXd normal = quadratic.normal.selfadjointView<Eigen::Lower>();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
   out.covariance = factor.solve(Eigen::MatrixXd::Identity(columns, columns));
   if (out.degrees_of_freedom >= 1 && out.chi2 > chi2_quantile(0.9995, out.degrees_of_freedom)) {
     // The noise that was declared does not explain the residuals: they themselves say how uncertain the result is.
     out.covariance *= out.chi2 / out.degrees_of_freedom;
   }
-  const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
-  Eigen::MatrixXd parameters = lin.derivative.rightCols(columns - frames);
-  if (frames > 0 && columns > frames) {
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(lin.derivative.leftCols(frames));
-    const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(parameters.rows(), frames);
-    parameters -= q * (q.transpose() * parameters);
+  const Eigen::VectorXd to_unbounded = factor.solve(quadratic.gradient);
+  for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
+    const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
+    const double value = unknowns.parameters[p].get(out.estimate.set);
+    const double unbounded = value + to_unbounded[i] * descent.unit(i);
+    const double sigma = std::sqrt(std::max(0.0, out.covariance(i, i))) * descent.unit(i);
+    out.at_bound.push_back(descent.on_bound(out.estimate, p));
+    out.interval.push_back(
+        allowed_interval(unbounded, sigma, unknowns.prior_of(p).least, out.at_bound.back()));
   }
-  if (parameters.cols() > 0) {
-    out.singular_values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(parameters.transpose() * parameters)
+  if (columns > frames) {
+    out.singular_values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(without_frames(normal, frames))
                               .eigenvalues()
                               .cwiseMax(0)
                               .cwiseSqrt()

@@ -19,31 +19,43 @@ struct EstimatorOptions {
   std::function<void(int, double)> progress;
 };
 
+/// Of one parameter, SI.
+struct Interval {
+  double low = 0;
+  double high = 0;
+};
+
 struct Fit {
   Estimate estimate;
   bool converged = false;  ///< the exact gradient vanishes, see newton_decrement
   int iterations = 0;      ///< accepted steps
-  /// What a full Gauss-Newton step would still gain, in units of chi-square: below 1e-8 is converged.
+  /// What a full Gauss-Newton step within the bounds would still gain, in units of chi-square: below 1e-8 is converged.
   double newton_decrement = 0;
   double chi2 = 0;  ///< sum of squared whitened residuals of the rows that count in full
   double degrees_of_freedom = 0;
   /// Standard deviation of the whitened residual as the bulk of the rows shows it; 1 where the model explains the data.
   double scale = 1;
   std::vector<double> weight;  ///< per row: 1 in full, less for outliers
-  /// Covariance of the unknowns in units_of(); from the declared noise, or from the residuals where chi-square says
-  /// that the noise alone does not explain them.
+  /// Covariance of the unknowns in units_of(), prior included, bounds left out; from the declared noise, or from the
+  /// residuals where chi-square says that the noise alone does not explain them.
   Eigen::MatrixXd covariance;
+  std::vector<bool> at_bound;  ///< per parameter: its estimate is the least that its prior allows
+  /// 95 % interval per parameter. Of one that is bounded: the 95 % of the normal distribution around the unbounded
+  /// estimate that physics allows; one-sided, from the bound up, where the estimate is at it.
+  std::vector<Interval> interval;
   Eigen::VectorXd
       singular_values;  ///< of the whitened, scaled derivative of the parameters (frames projected out)
 
   double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
 };
 
-/// Fits `unknowns`, starting at `start`. The derivative must have full column rank (eliminate() first).
+/// Fits `unknowns`, starting at `start`. The derivative (with the priors as further rows) must have full column rank:
+/// eliminate() first.
 ///
 /// Whitened throughout: metres and radians never meet unweighted. Robust loss: a row counts in full up to the 99.9 %
 /// quantile of its chi-square around the scale of the bulk, beyond it with weight (quantile / square): gross outliers
-/// lose their pull, and Gaussian data lose nothing.
+/// lose their pull, and Gaussian data lose nothing. Bounds are kept by every step (active set), and the proof of
+/// convergence is that of the bounded problem.
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const RobotFile& robot, const EstimatorOptions& options = {});
 

@@ -6,9 +6,16 @@
 
 namespace flexcomp::host {
 
-Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order,
+Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix) {
+  if (matrix.rows() <= matrix.cols()) return matrix;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(matrix);
+  return qr.matrixQR().topRows(matrix.cols()).triangularView<Eigen::Upper>();
+}
+
+Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::size_t>& order,
                       double tolerance) {
   Elimination out;
+  const Eigen::MatrixXd matrix = triangular_factor(all_rows);
   Eigen::MatrixXd basis(matrix.rows(), static_cast<Eigen::Index>(order.size()));
   Eigen::Index rank = 0;
   std::vector<std::size_t> kept_in_order;

@@ -29,6 +29,10 @@ struct Elimination {
 Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order,
                       double tolerance = 1e-6);
 
+/// The square triangular factor R of matrix = Q R where the matrix has more rows than that, else the matrix itself: all
+/// that rank, confounding and information of the columns depend on.
+Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix);
+
 /// Preference where columns are confounded: frames, base x y rx ry, links 1 to 6, effects, and last what the paper loses
 /// too: base z, base rz, compliance of joint 1 (contract.md).
 std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set);

@@ -3,7 +3,6 @@
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,17 +10,28 @@
 
 #include "catalogue/catalogue.hpp"
 #include "files/calibration_file.hpp"
+#include "files/tolerance_file.hpp"
 #include "identification/estimator.hpp"
 #include "identification/frames.hpp"
+#include "identification/knowable.hpp"
 #include "identification/statistics.hpp"
 
 namespace flexcomp::host {
 
+/// A parameter that is known from elsewhere and not fitted.
+struct FixedParameter {
+  std::string name;
+  double value_si = 0;
+};
+
 struct IdentifyOptions {
   ModelKind model = ModelKind::full;
   FrameChoice frames = FrameChoice::by_distance;
-  bool force = false;      ///< go on where the data look like another unit or another arm
-  std::uint64_t seed = 1;  ///< of the 1,000 random poses that say what such data could know
+  std::vector<FixedParameter> fixed;
+  std::vector<Tolerance> tolerances;  ///< of parameters by name; later ones win
+  bool physical = true;               ///< compliances are kept at or above zero
+  bool force = false;                 ///< go on where the data look like another unit or another arm
+  std::uint64_t seed = 1;             ///< of the 1,000 random poses that say what such data could know
   EstimatorOptions estimator;
 };
 
@@ -35,11 +45,8 @@ struct Identification {
   std::size_t parameters = 0;    ///< of the model, without F and E
   std::size_t identifiable = 0;  ///< of these, in these data
   std::size_t frame_parameters = 0;
-  std::vector<Confounded> confounded;  ///< cannot be told apart by any data of this kind
-  std::vector<std::string> missing;    ///< known to 1,000 random poses of this kind, but not to these data
-  /// Poses (rad) that would make the missing ones known, best first; empty where nothing is missing.
-  std::vector<std::array<double, joint_count>> cure;
-  Fit fit;
+  Knowable known;        ///< what these data know, what they lack, and what would cure it
+  Fit fit;               ///< of known.fitted
   double condition = 0;  ///< of the whitened, scaled columns of the parameters
   double o1 = 0;         ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
   Before before;
@@ -52,7 +59,7 @@ struct Identification {
 };
 
 /// \param source  names the data in messages
-/// \throws InputError  residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
+/// \throws InputError  a fixed parameter or a tolerance of one that the model does not have; residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
 ///                     millimetres, another arm), unless options.force; a fitted base above 20 mm or 2 degrees
 Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
                         const std::string& source, const IdentifyOptions& options);

@@ -67,100 +67,127 @@ std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& mo
   return out;
 }
 
+namespace {
+
+/// d value of a table's term per unit of one of its values, at one pose.
+double table_weight(const TermSet& set, const Term<double>& term, std::size_t value, const HostModel& model,
+                    const Linearisation<double, joint_count>& at, const Observation& row) {
+  const Table& table = set.tables[term.table];
+  const std::size_t index = value - table.offset;
+  if (term.basis == Basis::curve) {
+    const auto weights = detail::curve_weights(row.q_rad[term.joint], table.size);
+    double weight = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (weights.index[i] == index) weight += weights.w[i];
+    }
+    if (weight == 0) return 0;
+    switch (term.factor) {
+      case Factor::load_torque:
+        return weight * detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(term.joint, 2),
+                                                     at.unloaded.frames.origin[term.joint]);
+      case Factor::temperature:
+        return weight * (row.context.temperature_c - model.reference_temperature());
+      case Factor::payload:
+        return weight * row.context.payload_kg;
+      default:
+        return weight;
+    }
+  }
+  const double* nodes = set.values.data() + table.offset;
+  const auto along_rows = detail::find_cell<double>(
+      nodes, table.rows,
+      detail::covariate<double, joint_count>(table.row_covariate, table.row_joint, row.q_rad, row.context));
+  const auto along_columns =
+      detail::find_cell<double>(nodes + table.rows, table.columns,
+                                detail::covariate<double, joint_count>(
+                                    table.column_covariate, table.column_joint, row.q_rad, row.context));
+  const std::size_t cell = index - table.rows - table.columns;
+  const auto share = [](std::size_t node, const detail::Cell<double>& c) {
+    return node == c.index ? 1 - c.fraction : (node == c.index + 1 ? c.fraction : 0.0);
+  };
+  return share(cell / table.columns, along_rows) * share(cell % table.columns, along_columns);
+}
+
+/// How the pose (at the origin of Ftool, in Fb) moves per unit of a parameter.
+Vector6<double> pose_column(const Parameter& parameter, const TermSet& set, const HostModel& model,
+                            const Linearisation<double, joint_count>& at,
+                            const LoadResponse<double, joint_count>& response, const Observation& row) {
+  Vector6<double> column = Vector6<double>::Zero();
+  for (const std::size_t t : parameter.terms) {
+    const Term<double>& term = set.terms[t];
+    if (!parameter.value) {
+      column += exact_column(model, at, response, term, row.context);
+      continue;
+    }
+    const double weight = table_weight(set, term, *parameter.value, model, at, row);
+    if (weight != 0) column += screw(model, at, term.place) * (term.coefficient * weight);
+  }
+  return column;
+}
+
+/// Columns of F and E: rows position and rotation vector of the measured point, in the measurement frame.
+Eigen::Matrix<double, 6, 12> frame_columns_of(const Estimate& estimate, const Pose<double>& pose,
+                                              const Eigen::Vector3d& point) {
+  const Eigen::Matrix3d& f = estimate.f.rotation;
+  Eigen::Matrix<double, 6, 12> all = Eigen::Matrix<double, 6, 12>::Zero();
+  all.block<3, 3>(0, 0).setIdentity();
+  all.block<3, 3>(0, 3) = -skew(f * point);
+  all.block<3, 3>(3, 3).setIdentity();
+  all.block<3, 3>(0, 6) = f * pose.rotation;
+  all.block<3, 3>(3, 9) = f * pose.rotation * estimate.e.rotation;
+  return all;
+}
+
+}  // namespace
+
 Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
                       const Unknowns& unknowns) {
   const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
-  const Eigen::Index frame_columns = static_cast<Eigen::Index>(unknowns.frames.size());
   const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
   Linearised out;
-  out.residual = Eigen::VectorXd::Zero(6 * n);
-  out.derivative = Eigen::MatrixXd::Zero(6 * n, columns);
+  out.residual.resize(6 * n);
+  out.derivative.resize(6 * n, columns);
   const Eigen::VectorXd units = units_of(unknowns, estimate.set);
   Linearisation<double, joint_count> at;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> block(6, columns);
+  LoadResponse<double, joint_count> response;
   for (Eigen::Index k = 0; k < n; ++k) {
     const Observation& row = rows[static_cast<std::size_t>(k)];
     linearise(model, row.q_rad, row.context, at);
+    load_response(model, at, row.context, response);
     const Eigen::Vector3d lever = at.pose.rotation * (at.loaded.point + estimate.e.position);
     const Eigen::Vector3d point = at.pose.position + lever;
     const RowResidual r = residual_of(estimate, row, at.pose, point);
-    const Eigen::Matrix3d& f = estimate.f.rotation;
-    block.setZero();
-    if (!unknowns.frames.empty()) {
-      Eigen::Matrix<double, 6, 12> all = Eigen::Matrix<double, 6, 12>::Zero();
-      all.block<3, 3>(0, 0).setIdentity();
-      all.block<3, 3>(0, 3) = -skew(f * point);
-      all.block<3, 3>(3, 3).setIdentity();
-      all.block<3, 3>(0, 6) = f * at.pose.rotation;
-      all.block<3, 3>(3, 9) = f * at.pose.rotation * estimate.e.rotation;
-      for (std::size_t i = 0; i < unknowns.frames.size(); ++i) {
-        block.col(static_cast<Eigen::Index>(i)) = all.col(static_cast<Eigen::Index>(unknowns.frames[i]));
-      }
-    }
-    for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
-      const Parameter& parameter = unknowns.parameters[p];
-      Vector6<double> column = Vector6<double>::Zero();
-      for (const std::size_t t : parameter.terms) {
-        const Term<double>& term = estimate.set.terms[t];
-        if (parameter.value) {
-          // A table's value acts through its weight at this reading.
-          const Table& table = estimate.set.tables[term.table];
-          const std::size_t index = *parameter.value - table.offset;
-          if (term.basis == Basis::curve) {
-            const auto weights = detail::curve_weights(row.q_rad[term.joint], table.size);
-            double weight = 0;
-            for (std::size_t i = 0; i < 4; ++i) {
-              if (weights.index[i] == index) weight += weights.w[i];
-            }
-            if (weight == 0) continue;
-            double factor = 1;
-            if (term.factor == Factor::load_torque) {
-              factor = detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(term.joint, 2),
-                                                    at.unloaded.frames.origin[term.joint]);
-            } else if (term.factor == Factor::temperature) {
-              factor = row.context.temperature_c - model.reference_temperature();
-            } else if (term.factor == Factor::payload) {
-              factor = row.context.payload_kg;
-            }
-            column += screw(model, at, term.place) * (term.coefficient * weight * factor);
-          } else {
-            const auto row_cell =
-                detail::find_cell<double>(estimate.set.values.data() + table.offset, table.rows,
-                                          detail::covariate<double, joint_count>(
-                                              table.row_covariate, table.row_joint, row.q_rad, row.context));
-            const auto column_cell = detail::find_cell<double>(
-                estimate.set.values.data() + table.offset + table.rows, table.columns,
-                detail::covariate<double, joint_count>(table.column_covariate, table.column_joint, row.q_rad,
-                                                       row.context));
-            const std::size_t cell = index - table.rows - table.columns;
-            const std::size_t i = cell / table.columns;
-            const std::size_t j = cell % table.columns;
-            const auto share = [](std::size_t node, const detail::Cell<double>& c) {
-              return node == c.index ? 1 - c.fraction : (node == c.index + 1 ? c.fraction : 0.0);
-            };
-            const double weight = share(i, row_cell) * share(j, column_cell);
-            if (weight != 0) column += screw(model, at, term.place) * (term.coefficient * weight);
-          }
-        } else {
-          column += exact_column(model, at, term, row.context);
-        }
-      }
-      const Eigen::Index c = frame_columns + static_cast<Eigen::Index>(p);
-      const Eigen::Vector3d angular = column.tail<3>();
-      block.block<3, 1>(0, c) = f * (column.head<3>() + angular.cross(lever));
-      block.block<3, 1>(3, c) = f * angular;
-    }
-    if (row.has_orientation) {
-      block.bottomRows<3>() = inverse_right_jacobian(r.orientation_rad) * block.bottomRows<3>();
-    } else {
-      block.bottomRows<3>().setZero();
-    }
     Vector6<double> stacked;
     stacked << r.position_m, r.orientation_rad;
-    out.residual.segment<6>(6 * k) = row.whitening * stacked;
-    out.derivative.middleRows<6>(6 * k).noalias() = row.whitening * block;
+    out.residual.segment<6>(6 * k).noalias() = row.whitening * stacked;
+
+    // From a motion of the measured point in the measurement frame to the whitened residual ...
+    Matrix6d from_point = row.whitening;
+    if (row.has_orientation) {
+      from_point.rightCols<3>() = row.whitening.rightCols<3>() * inverse_right_jacobian(r.orientation_rad);
+    } else {
+      from_point.rightCols<3>().setZero();
+    }
+    Eigen::Index c = 0;
+    if (!unknowns.frames.empty()) {
+      const Eigen::Matrix<double, 6, 12> all = frame_columns_of(estimate, at.pose, point);
+      for (const std::size_t i : unknowns.frames) {
+        out.derivative.block<6, 1>(6 * k, c).noalias() =
+            from_point * (all.col(static_cast<Eigen::Index>(i)) * units[c]);
+        ++c;
+      }
+    }
+    // ... and from one of the origin of Ftool in Fb: through F, and over the lever to the point.
+    Matrix6d from_tool;
+    from_tool.leftCols<3>() = from_point.leftCols<3>() * estimate.f.rotation;
+    from_tool.rightCols<3>() =
+        from_point.rightCols<3>() * estimate.f.rotation - from_tool.leftCols<3>() * skew(lever);
+    for (const Parameter& p : unknowns.parameters) {
+      out.derivative.block<6, 1>(6 * k, c).noalias() =
+          from_tool * (pose_column(p, estimate.set, model, at, response, row) * units[c]);
+      ++c;
+    }
   }
-  out.derivative *= units.asDiagonal();
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,13 +23,24 @@ struct Estimate {
   Pose<double> e;  ///< measured frame in Ftool
 };
 
+/// What is known of a parameter before anything is measured, SI.
+struct PriorKnowledge {
+  double least = -std::numeric_limits<double>::infinity();  ///< physics forbids less: 0 for a compliance
+  double expected = 0;
+  double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
+};
+
 /// Which numbers a fit may move. Frames come first in every matrix, then the parameters.
 struct Unknowns {
   /// Free numbers of the frames: 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E. Ascending; empty: frames are fixed.
   std::vector<std::size_t> frames;
   std::vector<Parameter> parameters;
+  std::vector<PriorKnowledge> prior;  ///< one per parameter; may be shorter: of the others nothing is known
 
   std::size_t count() const { return frames.size() + parameters.size(); }
+  PriorKnowledge prior_of(std::size_t parameter) const {
+    return parameter < prior.size() ? prior[parameter] : PriorKnowledge();
+  }
 };
 
 /// All numbers of F and E that these rows can see: 12, or 9 where no orientation was measured.

@@ -66,8 +66,8 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   set.title = "Poses that were fitted";
   p.poses.push_back(set);
   add_parameters(p, r.calibration, robot);
-  p.missing = r.missing;
-  p.cure_rad = r.cure;
+  p.missing = r.known.missing;
+  for (const CuringPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
   return p;
 }
 

@@ -162,147 +162,191 @@ inline Vector6<S> column(const Model<S, N, Cap>& model, const Linearisation<S, N
   return screw(model, at, term.place) * basis_value(model, term, context, at.unloaded);
 }
 
-namespace detail {
-
-/// How the unloaded frames and the load change per unit of a constant slot.
-template <class S, std::size_t N>
-struct LoadChange {
-  std::size_t first = N + 1;               ///< frames from this one on move as one body
-  Vector3<S> linear = Vector3<S>::Zero();  ///< of the point at the origin of F0
-  Vector3<S> angular = Vector3<S>::Zero();
-  Load<S> load{Vector3<S>::Zero(), Vector3<S>::Zero()};
-
-  Vector3<S> of_axis(std::size_t frame, const Vector3<S>& axis) const {
-    return frame >= first ? cross<S>(angular, axis) : Vector3<S>(Vector3<S>::Zero());
-  }
-  Vector3<S> of_point(std::size_t frame, const Vector3<S>& point) const {
-    return frame >= first ? Vector3<S>(linear + cross<S>(angular, point)) : Vector3<S>(Vector3<S>::Zero());
-  }
+/// How the effects of a model answer when a constant slot moves the chain and its load: what exact_column() adds to
+/// column(), for every constant place of one pose.
+template <class S, std::size_t N = 6>
+struct LoadResponse {
+  using Matrix6 = Eigen::Matrix<S, 6, 6>;
+  bool any = false;          ///< false: no effect follows the load, the rest is not set
+  Vector3<S> com, tool;      ///< payload's centre of mass and origin of Ftool in F0, unloaded
+  Vector3<S> weight, force;  ///< of the payload, and external, N
+  Matrix6 to_load;           ///< change of the pose per change of the load [force; moment about F0]
+  std::array<Matrix6, N>
+      to_twist;  ///< [i]: per twist [linear; angular] (about F0) of everything after link i
 };
 
-template <class S, std::size_t N, class Cap>
-inline LoadChange<S, N> load_change(const Model<S, N, Cap>& model, const Linearisation<S, N>& at, Place place,
-                                    const Context<S, N>& context) {
-  LoadChange<S, N> change;
-  const Frames<S, N>& frames = at.unloaded.frames;
-  const std::array<S, 4>& edit = model.load_edit();
-  const Matrix3<S>& flange = frames.rotation[N];
-  const Vector3<S> com = frames.origin[N] + flange * Vector3<S>(context.payload_com_m[0] + edit[slot::com_x],
-                                                                context.payload_com_m[1] + edit[slot::com_y],
-                                                                context.payload_com_m[2] + edit[slot::com_z]);
-  const Vector3<S> weight = model.gravity() * (context.payload_kg + edit[slot::mass]);
-  const Vector3<S> force(context.force_n[0], context.force_n[1], context.force_n[2]);
-  const Vector3<S> tool = frames.origin[N] + flange * model.tool_pose().position;
-  if (place.body == body::load) {
-    if (place.slot == slot::mass) {
-      change.load = {model.gravity(), cross<S>(com, model.gravity())};
-    } else {
-      change.load.moment = cross<S>(flange.col(place.slot - slot::com_x), weight);
-    }
-  } else if (place.body == body::tool) {
-    if (place.slot <= slot::z) {
-      change.load.moment = cross<S>(flange * (model.nominal_tool().rotation.col(place.slot)), force);
-    }
-  } else if (place.body >= 1 && place.body <= N) {
-    const std::size_t i = place.body - 1U;
-    const std::array<S, 6> none{};
-    const Screw<S> s =
-        link_screw(model, frames, at.unloaded.angle[i], i, place.slot, none, Vector3<S>(Vector3<S>::Zero()));
-    change.first = i + 1;
-    change.linear = s.linear;
-    change.angular = s.angular;
-    change.load.moment =
-        cross<S>(change.of_point(N, com), weight) + cross<S>(change.of_point(N, tool), force);
-  }
-  return change;
-}
+namespace detail {
 
-/// Change of a moment about a direction through a point.
+/// d value of a basis that needs the load: per change of the load, and per twist of everything behind a link,
+/// which is one vector where only the far point of a lever moves and another where the whole basis moves.
 template <class S>
-inline S moment_change(const Load<S>& load, const Load<S>& change, const Vector3<S>& direction,
-                       const Vector3<S>& d_direction, const Vector3<S>& point, const Vector3<S>& d_point) {
-  return dot<S>(d_direction, load.moment - cross<S>(point, load.force)) +
-         dot<S>(direction, change.moment - cross<S>(d_point, load.force) - cross<S>(point, change.force));
+struct BasisResponse {
+  Vector6<S> load = Vector6<S>::Zero();   ///< per [force; moment]
+  Vector6<S> whole = Vector6<S>::Zero();  ///< per [linear; angular], while frame `frame` moves too
+  Vector6<S> part = Vector6<S>::Zero();   ///< the same while only frames up to `far` move, beyond `frame`
+  std::size_t frame = 0;
+  std::size_t far = 0;
+};
+
+/// Of a moment of the load about a direction that is fixed in a frame, through that frame's origin.
+template <class S>
+inline void respond_about(const Load<S>& load, const Vector3<S>& direction, const Vector3<S>& point,
+                          const S& factor, BasisResponse<S>& out) {
+  const Vector3<S> u = direction * factor;
+  const Vector3<S> turned = cross<S>(load.force, u);
+  const Vector3<S> moment = load.moment - cross<S>(point, load.force);
+  out.load << cross<S>(point, u), u;
+  // Direction and point move with the frame; that the load moves as well is in `load`.
+  out.whole << -turned, cross<S>(u, moment) - cross<S>(point, turned);
 }
 
-/// Change of basis_value() per unit of the slot behind `change`.
 template <class S, std::size_t N, class Cap>
-inline S basis_change(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
-                      const Workspace<S, N>& ws, const LoadChange<S, N>& change) {
+inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term<S>& term,
+                                       const Context<S, N>& context, const Workspace<S, N>& ws) {
+  BasisResponse<S> r;
   const std::size_t j = term.joint;
   const Frames<S, N>& f = ws.frames;
-  const auto about = [&](std::size_t frame, int axis) {
-    return moment_change<S>(ws.load, change.load, f.axis(frame, axis),
-                            change.of_axis(frame, f.axis(frame, axis)), f.origin[frame],
-                            change.of_point(frame, f.origin[frame]));
+  const auto about = [&](std::size_t frame, int axis, const S& factor) {
+    r.frame = r.far = frame;
+    respond_about<S>(ws.load, f.axis(frame, axis), f.origin[frame], factor, r);
   };
   switch (term.basis) {
     case Basis::load_torque:
-      return about(j, 2);
+      about(j, 2, S(1));
+      break;
     case Basis::load_torque_cubed: {
       const S tau = moment_about<S>(ws.load, f.axis(j, 2), f.origin[j]);
-      return S(3) * tau * tau * about(j, 2);
+      about(j, 2, S(3) * tau * tau);
+      break;
     }
     case Basis::load_moment_x:
-      return about(j + 1, 0);
+      about(j + 1, 0, S(1));
+      break;
     case Basis::load_moment_y:
-      return about(j + 1, 1);
+      about(j + 1, 1, S(1));
+      break;
     case Basis::base_moment_x:
     case Basis::base_moment_y: {
       const Vector3<S> axis = term.basis == Basis::base_moment_x ? Vector3<S>(Vector3<S>::UnitX())
                                                                  : Vector3<S>(Vector3<S>::UnitY());
-      const Vector3<S> zero = Vector3<S>::Zero();
-      return moment_change<S>(ws.load, change.load, axis, zero, Vector3<S>(S(0), S(0), term.argument), zero);
+      respond_about<S>(ws.load, axis, Vector3<S>(S(0), S(0), term.argument), S(1), r);
+      break;  // frame 0 never moves
     }
     case Basis::link_weight: {
       std::size_t far = N - 1;
       while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
       const Vector3<S> z = f.axis(j, 2);
-      const Vector3<S> dz = change.of_axis(j, z);
       const Vector3<S> arm = f.origin[far] - f.origin[j];
-      const Vector3<S> d_arm = change.of_point(far, f.origin[far]) - change.of_point(j, f.origin[j]);
       const S along = dot<S>(z, arm);
       const S square = dot<S>(arm, arm) - along * along;
       const S g2 = dot<S>(model.gravity(), model.gravity());
-      if (!(square > S(1e-6)) || !(g2 > S(0))) return S(0);
-      const S d_along = dot<S>(dz, arm) + dot<S>(z, d_arm);
-      const S d_square = S(2) * (dot<S>(arm, d_arm) - along * d_along);
-      const S top = dot<S>(z, cross<S>(arm, model.gravity()));
-      const S d_top =
-          dot<S>(dz, cross<S>(arm, model.gravity())) + dot<S>(z, cross<S>(d_arm, model.gravity()));
+      if (!(square > S(1e-6)) || !(g2 > S(0))) break;
       using std::sqrt;
-      return (d_top - top * d_square / (S(2) * square)) / sqrt(square * g2);
+      const S scale = S(1) / sqrt(square * g2);
+      const Vector3<S> pull = cross<S>(model.gravity(), z);
+      const Vector3<S> stretch = (pull - (arm - z * along) * (dot<S>(arm, pull) / square)) * scale;
+      r.frame = j;
+      r.far = far;
+      r.part << stretch, cross<S>(f.origin[far], stretch);
+      // Turning the lever is turning gravity the other way.
+      r.whole.template tail<3>() = cross<S>(model.gravity(), cross<S>(z, arm)) * -scale;
+      break;
     }
     case Basis::curve:
       if (term.factor == Factor::load_torque) {
         Term<S> alone = term;
         alone.factor = Factor::one;
-        return basis_value(model, alone, context, ws) * about(j, 2);
+        about(j, 2, basis_value(model, alone, context, ws));
       }
-      return S(0);
+      break;
     default:
-      return S(0);
+      break;
   }
+  return r;
 }
 
 }  // namespace detail
+
+/// The response of all effects at one pose, for exact_column(). Work grows with the effects, not with the columns.
+template <class S, std::size_t N, class Cap>
+inline void load_response(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
+                          const Context<S, N>& context, LoadResponse<S, N>& out) {
+  out.any = false;
+  if (!model.needs_loads()) return;
+  const Frames<S, N>& frames = at.unloaded.frames;
+  const std::array<S, 4>& edit = model.load_edit();
+  const Matrix3<S>& flange = frames.rotation[N];
+  out.com = frames.origin[N] + flange * Vector3<S>(context.payload_com_m[0] + edit[slot::com_x],
+                                                   context.payload_com_m[1] + edit[slot::com_y],
+                                                   context.payload_com_m[2] + edit[slot::com_z]);
+  out.tool = frames.origin[N] + flange * model.tool_pose().position;
+  out.weight = model.gravity() * (context.payload_kg + edit[slot::mass]);
+  out.force = Vector3<S>(context.force_n[0], context.force_n[1], context.force_n[2]);
+  out.to_load.setZero();
+  for (auto& m : out.to_twist) m.setZero();
+  for (std::size_t k = 0; k < model.effect_count(); ++k) {
+    const Term<S>& effect = model.effect(k);
+    // Effects at `point` move the measured point, not the pose that forward() gives.
+    if (!needs_loads(effect.basis, effect.factor) || effect.place.body == body::point) continue;
+    const Vector6<S> moved = screw(model, at, effect.place) * effect.coefficient;
+    if (!(dot<S>(moved.template head<3>(), moved.template head<3>()) +
+              dot<S>(moved.template tail<3>(), moved.template tail<3>()) >
+          S(0)))
+      continue;  // a coefficient that is still zero
+    out.any = true;
+    const detail::BasisResponse<S> r = detail::basis_response(model, effect, context, at.unloaded);
+    out.to_load.noalias() += moved * r.load.transpose();
+    // Frame f moves with the links 0 … f - 1.
+    for (std::size_t i = 0; i < r.frame; ++i) out.to_twist[i].noalias() += moved * r.whole.transpose();
+    for (std::size_t i = r.frame; i < r.far; ++i) out.to_twist[i].noalias() += moved * r.part.transpose();
+  }
+}
 
 /// Derivative of forward() for a term's coefficient: column() plus what the constant slot does to torques,
 /// levers and moments of the model's own effects.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
-                               const Term<S>& term, const Context<S, N>& context) {
+                               const LoadResponse<S, N>& response, const Term<S>& term,
+                               const Context<S, N>& context) {
   Vector6<S> r = column(model, at, term, context);
-  if (!(is_constant(term) && model.needs_loads()) || term.place.body == body::base) return r;
-  const detail::LoadChange<S, N> change = detail::load_change(model, at, term.place, context);
-  for (std::size_t k = 0; k < model.effect_count(); ++k) {
-    const Term<S>& effect = model.effect(k);
-    // Effects at `point` move the measured point, not the pose that forward() gives.
-    if (!needs_loads(effect.basis, effect.factor) || effect.place.body == body::point) continue;
-    const S d = detail::basis_change(model, effect, context, at.unloaded, change);
-    r += screw(model, at, effect.place) * (effect.coefficient * d);
+  if (!is_constant(term) || !response.any || term.place.body == body::base) return r;
+  const Place place = term.place;
+  const Matrix3<S>& flange = at.unloaded.frames.rotation[N];
+  Vector6<S> load = Vector6<S>::Zero();
+  if (place.body == body::load) {
+    if (place.slot == slot::mass) {
+      load << model.gravity(), cross<S>(response.com, model.gravity());
+    } else {
+      load.template tail<3>() = cross<S>(flange.col(place.slot - slot::com_x), response.weight);
+    }
+  } else if (place.body == body::tool) {
+    if (place.slot > slot::z) return r;
+    load.template tail<3>() =
+        cross<S>(flange * (model.nominal_tool().rotation.col(place.slot)), response.force);
+  } else if (place.body >= 1 && place.body <= N) {
+    const std::size_t i = place.body - 1U;
+    const std::array<S, 6> none{};
+    const Screw<S> s = detail::link_screw(model, at.unloaded.frames, at.unloaded.angle[i], i, place.slot,
+                                          none, Vector3<S>(Vector3<S>::Zero()));
+    Vector6<S> twist;
+    twist << s.linear, s.angular;
+    r.noalias() += response.to_twist[i] * twist;
+    load.template tail<3>() = cross<S>(s.linear + cross<S>(s.angular, response.com), response.weight) +
+                              cross<S>(s.linear + cross<S>(s.angular, response.tool), response.force);
+  } else {
+    return r;
   }
+  r.noalias() += response.to_load * load;
   return r;
+}
+
+/// The same for a single column.
+template <class S, std::size_t N, class Cap>
+inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
+                               const Term<S>& term, const Context<S, N>& context) {
+  LoadResponse<S, N> response;
+  load_response(model, at, context, response);
+  return exact_column(model, at, response, term, context);
 }
 
 }  // namespace flexcomp

@@ -20,72 +20,17 @@
 #include "identification/validate.hpp"
 #include "measurement/observation.hpp"
 #include "support/arms.hpp"
+#include "support/measuring.hpp"
 #include "units.hpp"
 
 namespace {
 
 using namespace flexcomp;
 using namespace flexcomp::host;
-
-constexpr double kPosition = 0.035e-3;
-const double kOrientation = radians(0.007);
-
-RobotFile tx60l() {
-  RobotFile robot;
-  robot.name = "staubli-tx60l";
-  robot.nominal = arms::tx60l();
-  robot.position_sigma_m = kPosition;
-  robot.orientation_sigma_rad = kOrientation;
-  return robot;
-}
-
-TermSet truth() {
-  const auto t = arms::table1(arms::all()[0]);
-  TermSet set;
-  set.terms = t.terms;
-  return set;
-}
-
-struct Measuring {
-  double noise = 1;  // times N1
-  bool pose = true;
-  std::vector<double> payload_kg{1.108};
-  Pose<double> f;
-  Pose<double> e;
-};
-
-Observation measure(const HostModel& model, const arms::Joints& q, std::size_t k, const Measuring& how,
-                    std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  const auto vector = [&](double sigma) {
-    return Eigen::Vector3d(sigma * normal(random), sigma * normal(random), sigma * normal(random));
-  };
-  Observation row;
-  row.q_rad = q;
-  row.context = default_context<double>(model.robot());
-  row.context.payload_kg = how.payload_kg[k % how.payload_kg.size()];
-  Workspace<double, 6> ws;
-  const Pose<double> pose = how.f * forward(model, q, row.context, ws) * how.e;
-  row.p_m = pose.position + vector(how.noise * kPosition);
-  row.R = rotation_of(vector(how.noise * kOrientation)) * pose.rotation;
-  row.has_orientation = how.pose;
-  row.whitening.setZero();
-  row.whitening.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / kPosition;
-  if (how.pose) row.whitening.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / kOrientation;
-  row.line = k + 2;
-  return row;
-}
-
-std::vector<Observation> measure(const RobotFile& robot, const TermSet& set, std::size_t count,
-                                 std::uint64_t seed, const Measuring& how = {}) {
-  const auto model = prepare(set, robot, "truth");
-  std::mt19937_64 random(seed);
-  arms::Random poses(seed * 7919 + 1);
-  std::vector<Observation> rows;
-  for (std::size_t k = 0; k < count; ++k)
-    rows.push_back(measure(*model, poses.pose(robot.nominal), k, how, random));
-  return rows;
-}
+using measuring::measure;
+using measuring::Measuring;
+using measuring::truth;
+using measuring::tx60l;
 
 ErrorStatistics held_out(const RobotFile& robot, const Calibration& c, const std::vector<Observation>& rows) {
   return validate(robot, c, rows, "held out").after;
@@ -94,6 +39,7 @@ ErrorStatistics held_out(const RobotFile& robot, const Calibration& c, const std
 IdentifyOptions plain() {
   IdentifyOptions o;
   o.estimator.robust = false;
+  o.physical = false;
   return o;
 }
 
@@ -104,7 +50,7 @@ TEST(Identify, NoiseFreePosesGiveThePapersErrorsBack) {
   const Identification r = identify(robot, measure(robot, truth(), 40, 1, how), "data", plain());
   EXPECT_EQ(r.parameters, 39U);
   EXPECT_EQ(r.identifiable, 36U);
-  EXPECT_TRUE(r.missing.empty());
+  EXPECT_TRUE(r.known.missing.empty());
   EXPECT_TRUE(r.fit.converged);
   EXPECT_LT(r.after.max_m, 1e-9);
   // Every number itself, with d1 + base z and theta1 + base rz lumped as the names say.
@@ -227,7 +173,7 @@ TEST(Identify, FramesOfAnySizeAreFound) {
     EXPECT_EQ(r.parameters, 33U);
     ASSERT_TRUE(r.calibration.frames);
     EXPECT_NEAR(r.fit.chi2_per_dof(), 1, 0.3);
-    EXPECT_TRUE(r.missing.empty());
+    EXPECT_TRUE(r.known.missing.empty());
     EXPECT_NEAR((r.calibration.f().position - how.f.position).norm(), 0, 3e-3);
     EXPECT_LT(held_out(robot, r.calibration, measure(robot, truth(), 50, 22, how)).mean_m, 0.12e-3);
     EXPECT_GT(r.before.nominal_frames.mean_m, 1);
@@ -239,10 +185,10 @@ TEST(Identify, TooFewPosesAreAnsweredWithWhatIsMissing) {
   const RobotFile robot = tx60l();
   for (const std::size_t count : {2U, 4U, 5U}) {
     const Identification r = identify(robot, measure(robot, truth(), count, 31), "data", IdentifyOptions());
-    EXPECT_FALSE(r.missing.empty()) << count;
+    EXPECT_FALSE(r.known.missing.empty()) << count;
     EXPECT_FALSE(r.doubts.empty());
-    EXPECT_EQ(r.identifiable + r.missing.size(), 36U) << count;
-    EXPECT_FALSE(r.cure.empty());
+    EXPECT_EQ(r.identifiable + r.known.missing.size(), 36U) << count;
+    EXPECT_FALSE(r.known.cure.empty());
   }
 }
 
@@ -285,12 +231,12 @@ TEST(Identify, OneOrientationIsAnsweredWithWhatIsMissingAndTheCureCures) {
   for (const arms::Joints& q : one_orientation(robot, 40))
     rows.push_back(measure(*model, q, rows.size(), how, random));
   const Identification r = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_FALSE(r.missing.empty());
-  ASSERT_FALSE(r.cure.empty());
-  ASSERT_LE(r.cure.size(), 20U);
-  for (const auto& q : r.cure) rows.push_back(measure(*model, q, rows.size(), how, random));
+  EXPECT_FALSE(r.known.missing.empty());
+  ASSERT_FALSE(r.known.cure.empty());
+  ASSERT_LE(r.known.cure.size(), 20U);
+  for (const auto& c : r.known.cure) rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
   const Identification cured = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_TRUE(cured.missing.empty()) << cured.missing.front();
+  EXPECT_TRUE(cured.known.missing.empty()) << cured.known.missing.front();
   EXPECT_EQ(cured.identifiable, 36U);
 }
 
