@@ -17,18 +17,14 @@
 #include "files/quaternion.hpp"
 #include "flexcomp/model.hpp"
 #include "kinematics/measured_pose.hpp"
+#include "measurement/noise_level.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 namespace {
 
-/// Standard deviations per axis (Chen et al. 2019, N1 and N2).
-struct Noise {
-  double position_m;
-  double orientation_rad;
-};
-const std::map<std::string, Noise> noise_levels{
-    {"N1", {0.035e-3, radians(0.007)}}, {"N2", {0.07e-3, radians(0.014)}}, {"none", {0, 0}}};
+const std::map<std::string, NoiseLevel> noise_levels{
+    {noise_n1.name, noise_n1}, {noise_n2.name, noise_n2}, {no_noise.name, no_noise}};
 
 const std::map<std::string, MeasurementKind> kinds{{"pose", MeasurementKind::pose},
                                                    {"position", MeasurementKind::position},
@@ -85,7 +81,7 @@ void Simulate::random_context(std::size_t k, const RobotFile& robot_file, std::m
 /// What the instrument says about a true pose.
 void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
                         Measurement& row) const {
-  const Noise& level = noise_levels.at(noise);
+  const NoiseLevel& level = noise_levels.at(noise);
   std::normal_distribution<double> normal(0, 1);
   const auto vector = [&](double sigma) {
     const double x = sigma * normal(random);
@@ -95,16 +91,16 @@ void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt1
   for (std::size_t r = 0;
        r < robot_file.reflectors_m.size() && kinds.at(measure) == MeasurementKind::reflectors; ++r) {
     row.reflector_m[r] =
-        pose.rotation * robot_file.reflectors_m[r] + pose.position + vector(level.position_m);
+        pose.rotation * robot_file.reflectors_m[r] + pose.position + vector(level.position_sigma_m);
   }
-  row.position_m = pose.position + vector(level.position_m);
-  const Eigen::Vector3d turn = vector(level.orientation_rad);
+  row.position_m = pose.position + vector(level.position_sigma_m);
+  const Eigen::Vector3d turn = vector(level.orientation_sigma_rad);
   if (turn.norm() > 0) {
     pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * pose.rotation;
   }
   row.orientation = unit_quaternion(pose.rotation);
-  row.position_sigma_m = level.position_m;
-  row.orientation_sigma_rad = level.orientation_rad;
+  row.position_sigma_m = level.position_sigma_m;
+  row.orientation_sigma_rad = level.orientation_sigma_rad;
 }
 
 void Simulate::run() const {

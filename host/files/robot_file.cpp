@@ -63,8 +63,10 @@ Capsule read_capsule(const YamlField& field) {
 
 }  // namespace
 
-RobotFile load_robot(const std::string& path) {
-  const YamlField root = YamlField::load(path);
+namespace {
+
+RobotFile read_robot(const YamlField& root) {
+  const std::string& path = root.file();
   root.require_keys(
       {"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise", "capsules"});
   RobotFile robot;
@@ -103,6 +105,14 @@ RobotFile load_robot(const std::string& path) {
     for (const YamlField& field : capsules->items()) robot.capsules.push_back(read_capsule(field));
   }
   return robot;
+}
+
+}  // namespace
+
+RobotFile load_robot(const std::string& path) { return read_robot(YamlField::load(path)); }
+
+RobotFile parse_robot(const std::string& text, const std::string& name) {
+  return read_robot(YamlField::parse(text, name));
 }
 
 }  // namespace flexcomp::host

@@ -42,6 +42,9 @@ struct RobotFile {
 ///                     whose norm is off 1 by more than 1e-3
 RobotFile load_robot(const std::string& path);
 
+/// The same from the text of a robot file; `name` stands for its path in messages.
+RobotFile parse_robot(const std::string& text, const std::string& name);
+
 }  // namespace flexcomp::host
 
 #endif

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,8 @@ class YamlField {
  public:
   /// The root of a file. \throws InputError  absent, unreadable, no YAML, empty
   static YamlField load(const std::string& path);
+  /// The root of a text; `name` stands for the file in messages. \throws InputError  no YAML, empty
+  static YamlField parse(const std::string& text, const std::string& name);
 
   std::size_t line() const;
   const std::string& path() const { return path_; }  ///< joints[3].a_mm
@@ -54,6 +57,7 @@ class YamlField {
   double number_or(const std::string& key, const Unit& unit, double otherwise) const;
 
  private:
+  static YamlField root(const std::function<YAML::Node()>& read, const std::string& name);
   YamlField(YAML::Node node, std::string file, std::string path, std::size_t line);
 
   YAML::Node node_;

@@ -264,6 +264,32 @@ std::string results_table(const Page& page) {
   return out + "</tbody></table></div>\n" + remarks + "</section>\n";
 }
 
+std::string free_section(const PageSection& section) {
+  std::string out = fmt::format("<section><h2>{}</h2>\n", escaped(section.title));
+  for (const std::string& text : section.paragraphs) out += fmt::format("<p>{}</p>\n", escaped(text));
+  if (!section.columns.empty()) {
+    out += "<div class=\"scroll\"><table><thead><tr>";
+    for (const std::string& name : section.columns)
+      out += fmt::format("<th scope=\"col\">{}</th>", escaped(name));
+    out += "</tr></thead><tbody>\n";
+    for (const std::vector<std::string>& row : section.rows) {
+      out += "<tr>";
+      for (std::size_t k = 0; k < row.size(); ++k) {
+        out += k == 0 ? fmt::format("<th scope=\"row\">{}</th>", escaped(row[k]))
+                      : fmt::format("<td>{}</td>", escaped(row[k]));
+      }
+      out += "</tr>\n";
+    }
+    out += "</tbody></table></div>\n";
+  }
+  if (!section.figures.empty()) {
+    out += "<div class=\"plots wide\">\n";
+    for (const auto& [svg, caption] : section.figures) out += figure(svg, escaped(caption));
+    out += "</div>\n";
+  }
+  return out + "</section>\n";
+}
+
 /// Only places beside this page or inside it: a report never leads into the network.
 bool is_local(const std::string& href) {
   return !href.empty() && href.find(':') == std::string::npos && !href.starts_with("//");
@@ -293,6 +319,7 @@ std::string html(const Page& page) {
     out += "</dl>\n";
   }
   for (const PagePoses& set : page.poses) out += poses_section(set);
+  for (const PageSection& section : page.sections) out += free_section(section);
   out += results_table(page);
   out += limits_of_the_data(page);
   out += parameter_table(page);

@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "files/robot_file.hpp"
@@ -59,6 +60,15 @@ struct PageResult {
   std::string remark;
 };
 
+/// Text, a table and figures about anything that has no form of its own above.
+struct PageSection {
+  std::string title;
+  std::vector<std::string> paragraphs;
+  std::vector<std::string> columns;  ///< of the table; none: no table
+  std::vector<std::vector<std::string>> rows;
+  std::vector<std::pair<std::string, std::string>> figures;  ///< SVG of plots.hpp and its caption
+};
+
 /// A link to a page beside this one, or to one of its own sections.
 struct PageLink {
   std::string href;
@@ -75,6 +85,7 @@ struct Page {
   std::vector<PageConfounded> confounded;
   std::vector<std::string> missing;  ///< parameters that these data do not know though such data could
   std::vector<std::array<double, joint_count>> cure_rad;  ///< poses that would make them known
+  std::vector<PageSection> sections;
   std::vector<PageResult> results;
   std::vector<PageLink> links;
   std::string made_by;  ///< "flexcomp 0.1.0, 2025-01-31"

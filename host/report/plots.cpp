@@ -181,7 +181,64 @@ std::vector<std::size_t> counts(const std::vector<double>& values, const Scale& 
   return count;
 }
 
+/// Round ends around a range of numbers.
+Scale around(double low, double high, bool log) {
+  if (log) {
+    low = std::pow(10, std::floor(std::log10(low)));
+    high = std::pow(10, std::ceil(std::log10(high)));
+    return {low, high > low ? high : 10 * low, true};
+  }
+  const double step = round_step(std::max(high - low, 1e-12 + 0.02 * std::abs(high)), 5);
+  return {step * std::floor(low / step + 1e-9), step * std::ceil(high / step - 1e-9), false};
+}
+
 }  // namespace
+
+std::string plot_curves(const Curves& c) {
+  double x_low = HUGE_VAL, x_high = -HUGE_VAL, y_low = HUGE_VAL, y_high = -HUGE_VAL;
+  for (const Curve& curve : c.curves) {
+    for (const auto& [x, y] : curve.points) {
+      if (c.log_y && !(y > 0)) continue;
+      x_low = std::min(x_low, x);
+      x_high = std::max(x_high, x);
+      y_low = std::min(y_low, y);
+      y_high = std::max(y_high, y);
+    }
+  }
+  if (!(y_high >= y_low)) return "";
+  const double margin = std::max(1e-9, c.x_texts.empty() ? 0.02 * (x_high - x_low) : 0.5);
+  const Scale x{x_low - margin, x_high + margin, false};
+  const Scale y = around(y_low, y_high, c.log_y);
+  Plot plot(c.described);
+  plot.y_axis(y.ticks(5), y, c.y_name);
+  std::vector<Tick> ticks = x.ticks(6);
+  if (!c.x_texts.empty()) {
+    ticks.clear();
+    for (std::size_t k = 0; k < c.x_texts.size(); ++k)
+      ticks.push_back({static_cast<double>(k), c.x_texts[k]});
+  }
+  plot.x_axis(ticks, x, c.x_name);
+  static constexpr std::array<const char*, 6> kinds{"after", "before", "y", "x", "z", "floor"};
+  for (std::size_t k = 0; k < c.curves.size() && k < kinds.size(); ++k) {
+    std::string line;
+    std::string dots;
+    for (const auto& [at, value] : c.curves[k].points) {
+      if (c.log_y && !(value > 0)) continue;
+      const double px_at = px(x.at(at));
+      const double py_at = py(y.at(value));
+      line += fmt::format("{}{:.1f} {:.1f}", line.empty() ? "M" : "L", px_at, py_at);
+      dots += dot(px_at, py_at);
+    }
+    if (c.x_texts.empty()) plot.path(line, fmt::format("line {}", kinds[k]).c_str());
+    if (c.curves[k].points.size() <= 60) plot.path(dots, fmt::format("dots {}", kinds[k]).c_str());
+    if (c.curves.size() > 1) {
+      const double row = py(1) + 12 + 13 * static_cast<double>(k);
+      plot.path(dot(px(1) - 8, row - 4), fmt::format("dots {}", kinds[k]).c_str());
+      plot.text(px(1) - 16, row, "end", c.curves[k].name);
+    }
+  }
+  return plot.done();
+}
 
 std::string plot_in_order(const ErrorPairs& errors) {
   const Scale y = scale_of(errors);

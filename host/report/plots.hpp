@@ -21,6 +21,23 @@ struct ErrorPairs {
   std::optional<double> floor;
 };
 
+struct Curve {
+  std::string name;
+  std::vector<std::array<double, 2>> points;  ///< x, y
+};
+
+/// Any quantity over any other: up to six curves with their names.
+struct Curves {
+  std::string described;  ///< for those who do not see it
+  std::string x_name;
+  std::string y_name;
+  std::vector<std::string>
+      x_texts;  ///< where x counts cases 0, 1, 2 …: their names; points are then not joined
+  bool log_y = false;
+  std::vector<Curve> curves;
+};
+std::string plot_curves(const Curves& curves);
+
 /// Each pose in the order of the data, before above after.
 std::string plot_in_order(const ErrorPairs& errors);
 /// Which share of the poses lies below which error.
