@@ -110,7 +110,8 @@ void Information::update(const Block& h, double sign) {
   if (f == 0) return;
   const Eigen::MatrixXd own = h.topRows(f);
   const Eigen::MatrixXd own_vh = v_nuisance_ * own;
-  const Eigen::LLT<Eigen::MatrixXd> own_llt(Eigen::MatrixXd::Identity(r, r) + sign * own.transpose() * own_vh);
+  const Eigen::LLT<Eigen::MatrixXd> own_llt(Eigen::MatrixXd::Identity(r, r) +
+                                            sign * own.transpose() * own_vh);
   if (own_llt.info() != Eigen::Success || own_llt.matrixLLT().diagonal().minCoeff() < 1e-2) return refresh();
   v_nuisance_.noalias() -= sign * own_vh * own_llt.solve(own_vh.transpose());
   figures_.log_det -= log_det_of(own_llt);

@@ -36,7 +36,7 @@ struct Criterion {
   Goal goal = Goal::dual;
 
   double o1(const Figures& f) const;
-  double fitness(const Figures& f) const;  ///< Omin, expected / O1
+  double fitness(const Figures& f) const;    ///< Omin, expected / O1
   double log_score(const Figures& f) const;  ///< logarithm of what `goal` makes small
 };
 

@@ -22,8 +22,8 @@ constexpr double confounded_below = 1e-3;
 Vector6<double> frame_column(std::size_t i, const Pose<double>& pose) {
   Vector6<double> column = Vector6<double>::Zero();
   const auto axis = static_cast<Eigen::Index>(i % 3);
-  const Eigen::Vector3d direction = i < 6 ? Eigen::Vector3d(Eigen::Vector3d::Unit(axis))
-                                          : Eigen::Vector3d(pose.rotation.col(axis));
+  const Eigen::Vector3d direction =
+      i < 6 ? Eigen::Vector3d(Eigen::Vector3d::Unit(axis)) : Eigen::Vector3d(pose.rotation.col(axis));
   if (i % 6 < 3) {
     column.head<3>() = direction;
   } else {
@@ -65,8 +65,8 @@ PoseInformation::PoseInformation(const RobotFile& robot, ModelKind kind, bool fr
   Unknowns all;
   all.parameters = paper.parameters;
   if (frames) {
-    const bool orientation = std::any_of(like.begin(), like.end(),
-                                         [](const Sight& s) { return s.instrument.rows() == 6; });
+    const bool orientation =
+        std::any_of(like.begin(), like.end(), [](const Sight& s) { return s.instrument.rows() == 6; });
     for (std::size_t i = 0; i < (orientation ? 12U : 9U); ++i) all.frames.push_back(i);
   }
   frames_ = all.frames;

@@ -65,8 +65,10 @@ class PoseInformation {
                   std::uint64_t seed = 1);
 
   Eigen::Index unknowns() const { return nuisance() + parameters(); }
-  Eigen::Index nuisance() const { return static_cast<Eigen::Index>(frames_.size()); }    ///< of F and E
-  Eigen::Index parameters() const { return static_cast<Eigen::Index>(columns_.size()); }  ///< identifiable ones
+  Eigen::Index nuisance() const { return static_cast<Eigen::Index>(frames_.size()); }  ///< of F and E
+  Eigen::Index parameters() const {
+    return static_cast<Eigen::Index>(columns_.size());
+  }  ///< identifiable ones
   std::size_t parameters_of_model() const { return parameters_of_model_; }
 
   /// Names of the identifiable parameters, and what one scaled unit of each is in the unit of files.
@@ -74,7 +76,9 @@ class PoseInformation {
   const std::vector<double>& file_units() const { return file_units_; }
 
   /// H of one pose. About 2 microseconds.
-  void block(const Sight& sight, Block& out) const { block(sight.q_rad, sight.context, sight.instrument, out); }
+  void block(const Sight& sight, Block& out) const {
+    block(sight.q_rad, sight.context, sight.instrument, out);
+  }
   void block(const Joints& q_rad, const PoseContext& context, const Instrument& instrument, Block& out) const;
 
  private:
@@ -84,7 +88,7 @@ class PoseInformation {
   };
   using SmallModel = Model<double, joint_count, Capacity<1, 1, 1>>;
 
-  SmallModel model_;  ///< the nominal arm: every coefficient is zero there
+  SmallModel model_;                 ///< the nominal arm: every coefficient is zero there
   std::vector<std::size_t> frames_;  ///< 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E
   std::vector<double> frame_units_;
   std::vector<Column> columns_;

@@ -102,8 +102,9 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
         double own = t;
         for (int shorter = 0;; ++shorter, own /= 4) {
           for (std::size_t j = 0; j < joint_count; ++j) {
-            trial[k].q_rad[j] = std::clamp(set[k].q_rad[j] + own * direction[first + static_cast<Eigen::Index>(j)],
-                                           problem.limits[j].min_rad, problem.limits[j].max_rad);
+            trial[k].q_rad[j] =
+                std::clamp(set[k].q_rad[j] + own * direction[first + static_cast<Eigen::Index>(j)],
+                           problem.limits[j].min_rad, problem.limits[j].max_rad);
           }
           if (!problem.feasible || problem.feasible(trial[k].q_rad)) break;
           if (shorter == 3) {
@@ -117,8 +118,7 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
         problem.block(trial[k], trial_blocks[k]);
       }
       evaluations += set.size();
-      accepted = slope < 0 &&
-                 criterion.log_score(problem.of(trial_blocks).figures()) <= value + 1e-4 * slope;
+      accepted = slope < 0 && criterion.log_score(problem.of(trial_blocks).figures()) <= value + 1e-4 * slope;
     }
     if (!accepted) {
       if (steps.empty()) break;

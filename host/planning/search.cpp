@@ -1,6 +1,5 @@
 #include "planning/search.hpp"
 
-#include <limits>
 #include <stdexcept>
 
 namespace flexcomp::host {
@@ -77,9 +76,7 @@ PlannedPose PlanProblem::random_pose(std::mt19937_64& random) const {
   throw std::runtime_error("none of 1,000,000 random poses is allowed");
 }
 
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11U) * 0x1.0p-53;
-}
+double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11U) * 0x1.0p-53; }
 
 std::size_t below(std::size_t count, std::mt19937_64& random) {
   return static_cast<std::size_t>(uniform(random) * static_cast<double>(count));
@@ -93,10 +90,14 @@ std::mt19937_64 random_of(std::uint64_t seed, std::uint64_t index) {
 
 bool Search::offer(const PoseSet& set, double log_fitness) {
   if (!(log_fitness < best_log_)) return false;
+  replace_best(set, log_fitness);
+  return true;
+}
+
+void Search::replace_best(const PoseSet& set, double log_fitness) {
   best_ = set;
   best_log_ = log_fitness;
   history_.emplace_back(evaluations_, log_fitness);
-  return true;
 }
 
 nlohmann::json to_json(const PoseSet& set) {

@@ -7,10 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "planning/criterion.hpp"
@@ -28,12 +29,12 @@ using PoseSet = std::vector<PlannedPose>;
 struct PlanProblem {
   std::shared_ptr<const PoseInformation> information;
   Instrument instrument = Instrument::position(1);
-  std::vector<PoseContext> payloads;                 ///< contexts that differ in their payload; one or more
+  std::vector<PoseContext> payloads;  ///< contexts that differ in their payload; one or more
   std::array<JointLimits, joint_count> limits{};
-  std::function<bool(const Joints&)> feasible;       ///< beyond the limits; empty: everything is
-  std::vector<Joints> candidates;                    ///< only these; empty: anything within the limits
-  std::size_t poses = 0;                             ///< how many to choose
-  Eigen::MatrixXd known;                             ///< Σ HHᵀ of what has been measured already
+  std::function<bool(const Joints&)> feasible;  ///< beyond the limits; empty: everything is
+  std::vector<Joints> candidates;               ///< only these; empty: anything within the limits
+  std::size_t poses = 0;                        ///< how many to choose
+  Eigen::MatrixXd known;                        ///< Σ HHᵀ of what has been measured already
   std::size_t known_poses = 0;
 
   Criterion criterion(Goal goal = Goal::dual) const;
@@ -70,8 +71,8 @@ class Search {
   virtual double progress() const = 0;  ///< share of the work that is done, 0 … 1
   bool done() const { return progress() >= 1; }
 
-  const PoseSet& best() const { return best_; }           ///< empty before the first step
-  double best_log_fitness() const { return best_log_; }   ///< of the dual index, whatever the method looks at
+  const PoseSet& best() const { return best_; }          ///< empty before the first step
+  double best_log_fitness() const { return best_log_; }  ///< of the dual index, whatever the method looks at
   std::uint64_t evaluations() const { return evaluations_; }  ///< poses whose H or gain was computed
   /// Evaluations and log fitness at each improvement, for people.
   const std::vector<std::pair<std::uint64_t, double>>& history() const { return history_; }
@@ -86,6 +87,8 @@ class Search {
   virtual void load_own(const nlohmann::json& state) = 0;
   /// Takes a set as the best where it is better.
   bool offer(const PoseSet& set, double log_fitness);
+  /// Takes it in any case: for a method that looks at something else.
+  void replace_best(const PoseSet& set, double log_fitness);
 
   const PlanProblem& problem_;
   std::uint64_t evaluations_ = 0;
