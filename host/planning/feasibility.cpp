@@ -111,6 +111,7 @@ Feasibility::Feasibility(const RobotFile& robot, const std::optional<Cell>& cell
         "{}: no tool.reflectors_mm: the tool point stands for the reflector that the tracker sees.",
         robot.path));
   }
+  for (Body& body : bodies_) body.half_length_m = (body.capsule.to_m - body.capsule.from_m).norm() / 2;
   std::vector<LinkFrames> samples(bodies_.empty() ? 0 : sample_count);
   RandomPoses random(limits_, sample_seed);
   for (LinkFrames& frames : samples) place(random(), frames);
@@ -146,7 +147,7 @@ void Feasibility::choose_pairs(const RobotFile& robot, const std::vector<LinkFra
       const bool fixed = most - least < 1e-9;
       if (!fixed && (obstacle || most > touch)) {
         pairs_.push_back({i, j});
-      } else if (most <= touch) {
+      } else if (obstacle && most <= touch) {
         warnings_.push_back(fmt::format("{} and {} touch at every pose: not tested against each other.",
                                         bodies_[i].name, bodies_[j].name));
       }
@@ -252,12 +253,17 @@ bool Feasibility::find_facing(const LinkFrames& frames, Finding& finding) const 
   return false;
 }
 
-bool Feasibility::find_touch(const LinkFrames& frames, Finding& finding) const {
+bool Feasibility::find_touch(const Axes& axes, Finding& finding) const {
   for (const Pair& pair : pairs_) {
     const Body& a = bodies_[pair.first];
     const Body& b = bodies_[pair.second];
-    const double square = squared_distance(placed(a, frames), placed(b, frames));
+    const Segment& at = axes[pair.first];
+    const Segment& bt = axes[pair.second];
     const double needed = a.capsule.radius_m + b.capsule.radius_m;
+    // Balls around the bodies' middles first: most pairs are far apart.
+    const double apart = 0.25 * (at.from + at.to - bt.from - bt.to).squaredNorm();
+    if (!nearer(apart, needed + a.half_length_m + b.half_length_m)) continue;
+    const double square = squared_distance(at, bt);
     if (!nearer(square, needed)) continue;
     finding = {Obstruction::bodies_touch, pair.first, pair.second, std::sqrt(square), needed};
     return true;
@@ -265,12 +271,12 @@ bool Feasibility::find_touch(const LinkFrames& frames, Finding& finding) const {
   return false;
 }
 
-bool Feasibility::find_tool(const LinkFrames& frames, Finding& finding) const {
+bool Feasibility::find_tool(const LinkFrames& frames, const Axes& axes, Finding& finding) const {
   const Eigen::Vector3d centre = placed(centre_, frames);
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
     if (body.capsule.frame == joint_count) continue;
-    const Segment axis = placed(body, frames);
+    const Segment& axis = axes[i];
     // No part of the tool is farther from its centre than this.
     if (!nearer(squared_distance(centre, axis), body.largest_clearance_m + tool_radius_m_)) continue;
     for (std::size_t k = 0; k < reflector_.size(); ++k) {
@@ -291,11 +297,11 @@ bool Feasibility::find_tool(const LinkFrames& frames, Finding& finding) const {
   return false;
 }
 
-bool Feasibility::find_beam(const LinkFrames& frames, Finding& finding) const {
+bool Feasibility::find_beam(const LinkFrames& frames, const Axes& axes, Finding& finding) const {
   const Segment middle{*tracker_m_, placed(centre_, frames)};
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
-    const Segment axis = placed(body, frames);
+    const Segment& axis = axes[i];
     // At the same fraction of their ways no beam is farther from the one to the tool's centre than this.
     if (!nearer(squared_distance(middle, axis), body.largest_clearance_m + tool_radius_m_)) continue;
     for (std::size_t k = 0; k < reflector_.size(); ++k) {
@@ -321,8 +327,11 @@ Feasibility::Finding Feasibility::find(const Joints& q_rad) const {
   LinkFrames frames;
   place(q_rad, frames);
   if (tracker_m_ && find_facing(frames, finding)) return finding;
-  if (find_touch(frames, finding) || find_tool(frames, finding)) return finding;
-  if (tracker_m_) find_beam(frames, finding);
+  thread_local Axes axes;  // called a million times: keeps its memory
+  axes.clear();
+  for (const Body& body : bodies_) axes.push_back(placed(body, frames));
+  if (find_touch(axes, finding) || find_tool(frames, axes, finding)) return finding;
+  if (tracker_m_) find_beam(frames, axes, finding);
   return finding;
 }
 

@@ -47,8 +47,8 @@ std::string name_of(Obstruction obstruction);
 ///   warning says so. (The reference tool on the TX60L: reflector A is 138 mm from the wrist's centre at every pose, and
 ///   95 + 3 * 19.05 mm would be 152.) Obstacles and bodies on frame 0 get no such allowance.
 /// - *Arm*: bodies keep more than r_i + r_j from each other and from obstacles. Left out are bodies of the same frame;
-///   neighbours (no frame between theirs has a body), which overlap at their joint; pairs that touch at every pose, which
-///   the drawing has so; bodies on frame 0 against obstacles, and any other pair whose distance no joint changes.
+///   neighbours (no frame between theirs has a body), which overlap at their joint; pairs that touch at every pose, as
+///   fat bodies around a joint do; bodies on frame 0 against obstacles, and any other pair whose distance no joint changes.
 ///
 /// "At any pose" is judged on some thousand random poses in the joint limits, the same in every run.
 /// Const and thread-safe; about a microsecond a call.
@@ -73,6 +73,7 @@ class Feasibility {
     Capsule capsule;
     std::string name;
     bool obstacle = false;
+    double half_length_m = 0;
     double largest_clearance_m = 0;  ///< of all below
     /// Per reflector, m: what reflector and beam, and the arm to it, keep from the axis; below 0: not tested.
     std::vector<double> reflector_clearance_m;
@@ -94,14 +95,16 @@ class Feasibility {
   using Joints = std::array<double, joint_count>;
   using LinkFrames = Frames<double, joint_count>;
 
+  using Axes = std::vector<Segment>;  ///< of all bodies, in F0
+
   void place(const Joints& q_rad, LinkFrames& frames) const;
   Segment placed(const Body& body, const LinkFrames& frames) const;
   Eigen::Vector3d placed(const Eigen::Vector3d& in_flange_m, const LinkFrames& frames) const;
   Finding find(const Joints& q_rad) const;
   bool find_facing(const LinkFrames& frames, Finding& finding) const;
-  bool find_touch(const LinkFrames& frames, Finding& finding) const;
-  bool find_tool(const LinkFrames& frames, Finding& finding) const;
-  bool find_beam(const LinkFrames& frames, Finding& finding) const;
+  bool find_touch(const Axes& axes, Finding& finding) const;
+  bool find_tool(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
+  bool find_beam(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
   void choose_pairs(const RobotFile& robot, const std::vector<LinkFrames>& samples);
   void choose_clearances(const std::vector<LinkFrames>& samples);
   void warn_of_tracker();
