@@ -161,16 +161,16 @@ void Feasibility::choose_clearances(const std::vector<LinkFrames>& samples) {
     const bool moves_with_tool = body.capsule.frame == joint_count;
     const bool stands = body.capsule.frame == 0;
     const double radius = body.capsule.radius_m;
-    std::array<double, 3> factors{safety_, std::min(safety_, 1.0), 0};
-    std::string relaxed;
+    const std::array<double, 3> factors{safety_, std::min(safety_, 1.0), 0};
+    std::array<std::vector<std::string>, 4> kept;  // by factor, the last: not tested
     const auto clearance = [&](double most, const std::string& part) {
-      for (const double factor : factors) {
-        const double needed = radius + factor * smr_radius_m_;
+      for (std::size_t n = 0; n < factors.size(); ++n) {
+        const double needed = radius + factors[n] * smr_radius_m_;
         if (!stands && !(most > needed)) continue;
-        if (factor != safety_) relaxed += fmt::format("; {} keeps {:.3g}", part, factor);
+        kept[n].push_back(part);
         return needed;
       }
-      relaxed += fmt::format("; {} is not tested", part);
+      kept.back().push_back(part);
       return not_tested;
     };
     for (std::size_t k = 0; k < reflector_.size(); ++k) {
@@ -187,14 +187,21 @@ void Feasibility::choose_clearances(const std::vector<LinkFrames>& samples) {
       body.reflector_clearance_m.push_back(moves_with_tool ? not_tested : body.beam_clearance_m.back());
       body.arm_clearance_m.push_back(moves_with_tool || stand_in_
                                          ? not_tested
-                                         : clearance(std::sqrt(arm), "the arm to " + reflector_name(k)));
+                                         : clearance(std::sqrt(arm), fmt::format("arm {}", "ABCD"[k])));
     }
     body.largest_clearance_m = radius + safety_ * smr_radius_m_;
+    std::string relaxed;
+    for (std::size_t n = 1; n < kept.size(); ++n) {
+      if (kept[n].empty()) continue;
+      relaxed +=
+          fmt::format("; {}: {}", n < factors.size() ? fmt::format("{:.3g}", factors[n]) : "not tested",
+                      fmt::join(kept[n], ", "));
+    }
     if (!relaxed.empty()) {
-      warnings_.push_back(
-          fmt::format("{} is so near to the tool at every pose that parts of it cannot keep {:.3g} reflector "
-                      "radii away{}.",
-                      body.name, safety_, relaxed));
+      warnings_.push_back(fmt::format(
+          "{} is so near to the tool at every pose that not all of it can keep {:.3g} reflector radii away. "
+          "Kept instead{}.",
+          body.name, safety_, relaxed));
     }
   }
 }

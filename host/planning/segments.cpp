@@ -1,5 +1,6 @@
 #include "planning/segments.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace flexcomp::host {
@@ -15,24 +16,21 @@ double squared_distance(const Eigen::Vector3d& point, const Segment& segment) {
 
 double squared_distance(const Segment& a, const Segment& b) {
   // The nearest points lie inside both segments (then on the common perpendicular of the two lines), or one of them is an
-  // end. Nearly parallel lines leave the perpendicular's place open, by as little as it then matters; the ends are asked
-  // besides, so that no case needs a threshold.
+  // end. Between nearly parallel lines the perpendicular's place is uncertain, by as little as it then matters; the ends
+  // are asked besides, so that no case needs a threshold. Cross products, because uu * vv - uv * uv would lose twice as
+  // many digits.
   const Eigen::Vector3d u = a.to - a.from;
   const Eigen::Vector3d v = b.to - b.from;
-  const Eigen::Vector3d w = a.from - b.from;
-  const double uu = u.squaredNorm();
-  const double uv = u.dot(v);
-  const double vv = v.squaredNorm();
-  const double uw = u.dot(w);
-  const double vw = v.dot(w);
-  const double determinant = uu * vv - uv * uv;
+  const Eigen::Vector3d w = b.from - a.from;
+  const Eigen::Vector3d n = u.cross(v);
+  const double nn = n.squaredNorm();
   double least = -1;
-  if (determinant > 0) {
-    const double s = uv * vw - vv * uw;
-    const double t = uu * vw - uv * uw;
-    if (s > 0 && s < determinant && t > 0 && t < determinant) {
-      least = (w + (s / determinant) * u - (t / determinant) * v).squaredNorm();
-      if (determinant > 1e-6 * uu * vv) return least;
+  if (nn > 0) {
+    const double s = w.cross(v).dot(n);
+    const double t = w.cross(u).dot(n);
+    if (s > 0 && s < nn && t > 0 && t < nn) {
+      least = ((s / nn) * u - (t / nn) * v - w).squaredNorm();
+      if (nn > 1e-6 * u.squaredNorm() * v.squaredNorm()) return least;
     }
   }
   const double ends = std::min(std::min(squared_distance(a.from, b), squared_distance(a.to, b)),
