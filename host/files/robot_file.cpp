@@ -51,16 +51,6 @@ void read_tool(const YamlField& tool, RobotFile& robot) {
   }
 }
 
-Capsule read_capsule(const YamlField& field) {
-  field.require_keys({"frame", "from_mm", "to_mm", "radius_mm"});
-  Capsule capsule;
-  capsule.frame = field.at("frame").integer(0, joint_count);
-  capsule.from_m = field.at("from_mm").vector3(unit::mm);
-  capsule.to_m = field.at("to_mm").vector3(unit::mm);
-  capsule.radius_m = field.at("radius_mm").number(unit::mm, 0, "a radius above 0");
-  return capsule;
-}
-
 }  // namespace
 
 namespace {

@@ -1,0 +1,98 @@
+/// \file
+/// How good a set of poses is (Chen et al. 2019, Eq. 30-33), kept up to date by low-rank updates.
+///
+/// M = HᵀH over the set, H whitened and scaled by fixed units. With L parameters and n poses
+///   O1 = det(M)^(1/2L) / √n                 (Borm and Menq: geometric mean of the singular values of H, per √pose)
+///   Omin, expected = tr(M⁻¹)                (mean over the noise of the squared errors in units; Eq. 30 needs the truth)
+///   fitness = Omin, expected / O1           (Eq. 33; smaller is better)
+/// Where the frames of the measurement are fitted too, M is its Schur complement: what is left for the parameters.
+#ifndef FLEXCOMP_HOST_PLANNING_CRITERION_HPP
+#define FLEXCOMP_HOST_PLANNING_CRITERION_HPP
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "planning/pose_information.hpp"
+
+namespace flexcomp::host {
+
+/// What a search makes small.
+enum class Goal {
+  dual,       ///< fitness: Omin, expected / O1
+  d_optimal,  ///< 1 / O1 alone, what DETMAX looks at
+};
+
+/// The two figures that every criterion is made of, of the parameters (frames projected out).
+struct Figures {
+  double trace = 0;    ///< of M⁻¹
+  double log_det = 0;  ///< of M
+};
+
+/// The criterion of a set of `poses` poses for `parameters` unknowns.
+struct Criterion {
+  Eigen::Index parameters = 0;
+  double poses = 0;
+  Goal goal = Goal::dual;
+
+  double o1(const Figures& f) const;
+  double fitness(const Figures& f) const;    ///< Omin, expected / O1
+  double log_score(const Figures& f) const;  ///< logarithm of what `goal` makes small
+};
+
+/// M and its inverse. Rank-r updates; rebuilt from M where rounding would add up.
+class Information {
+ public:
+  /// Nothing known but a prior: `prior` on the diagonal (1/σ² in units), so that too few poses have an inverse too.
+  Information(Eigen::Index nuisance, Eigen::Index parameters, double prior);
+
+  /// M from scratch (without the prior).
+  void assign(const Eigen::MatrixXd& m);
+  void add(const Block& h) { update(h, 1); }
+  void remove(const Block& h) { update(h, -1); }
+
+  const Figures& figures() const { return figures_; }
+  const Eigen::MatrixXd& matrix() const { return m_; }  ///< with the prior
+  const Eigen::MatrixXd& inverse() const { return v_; }
+  const Eigen::MatrixXd& nuisance_inverse() const { return v_nuisance_; }
+  Eigen::Index unknowns() const { return m_.rows(); }
+  Eigen::Index nuisance() const { return v_nuisance_.rows(); }
+  Eigen::Index parameters() const { return unknowns() - nuisance(); }
+
+  /// The figures of M + HHᵀ, without changing anything.
+  Figures with(const Block& h) const;
+  /// The same for many blocks of `rows` columns that stand side by side.
+  void with_each(const Eigen::MatrixXd& blocks, Eigen::Index rows, std::vector<Figures>& out) const;
+
+  /// Derivative of log score for M (frames included): d log score = Σ gradient ∘ dM.
+  Eigen::MatrixXd gradient(const Criterion& criterion) const;
+
+ private:
+  void update(const Block& h, double sign);
+  void refresh();
+  template <int R, class H, class VH>
+  Figures changed(const H& h, const VH& vh) const;
+
+  double prior_ = 0;
+  Eigen::MatrixXd m_;
+  Eigen::MatrixXd v_;           ///< M⁻¹
+  Eigen::MatrixXd v_nuisance_;  ///< inverse of the frames' own block of M
+  Figures figures_;
+  int updates_ = 0;  ///< since the last refresh
+};
+
+/// Σ HHᵀ of blocks.
+Eigen::MatrixXd sum_of_squares(const std::vector<Block>& blocks, Eigen::Index unknowns);
+
+/// The figures of a set from scratch and without any prior: by an orthogonal decomposition of H, no normal equations.
+/// Nothing where H does not have full column rank to 1e-10.
+struct ExactFigures {
+  bool full_rank = false;
+  Figures figures;
+  Eigen::VectorXd sigma;  ///< of each parameter, in units
+};
+ExactFigures exact_figures(const std::vector<Block>& blocks, Eigen::Index nuisance);
+
+}  // namespace flexcomp::host
+
+#endif

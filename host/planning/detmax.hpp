@@ -1,0 +1,47 @@
+/// \file
+/// DETMAX (Mitchell 1974): D-optimal sets by excursions, in which the set grows and shrinks by several poses before it
+/// comes back to its size. The baseline of the paper's Fig. 8.
+#ifndef FLEXCOMP_HOST_PLANNING_DETMAX_HPP
+#define FLEXCOMP_HOST_PLANNING_DETMAX_HPP
+
+#include <cstdint>
+
+#include "planning/exchange.hpp"
+#include "planning/search.hpp"
+
+namespace flexcomp::host {
+
+/// Excursions from `chosen` until none of them raises det M; returns the logarithm of 1/O1, which never grows.
+/// \param farthest  poses that an excursion may be off the set's size (Mitchell: 6)
+double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector<std::size_t>& chosen,
+              std::mt19937_64& random, std::uint64_t& evaluations, std::size_t farthest = 6);
+
+struct DetmaxOptions {
+  std::size_t candidates = 5000;  ///< where the problem brings none
+  std::uint64_t restarts = 10;    ///< Mitchell: ten
+  std::uint64_t seed = 1;
+};
+
+/// Restarts of detmax() on one pool. The best is the one with the largest determinant, whatever its dual index.
+class DetmaxSearch : public Search {
+ public:
+  DetmaxSearch(const PlanProblem& problem, const DetmaxOptions& options);
+  void step() override;
+  double progress() const override {
+    return static_cast<double>(next_) / static_cast<double>(options_.restarts);
+  }
+
+ protected:
+  void save_own(nlohmann::json& state) const override;
+  void load_own(const nlohmann::json& state) override;
+
+ private:
+  DetmaxOptions options_;
+  CandidatePool pool_;
+  std::uint64_t next_ = 0;
+  double least_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace flexcomp::host
+
+#endif

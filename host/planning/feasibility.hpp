@@ -1,0 +1,139 @@
+/// \file
+/// Whether a measurement pose can be taken: joint limits, bodies, and the laser tracker's beam (Chen et al. 2019, Section
+/// 3.2, Eq. 26-29), by exact distances.
+#ifndef FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
+#define FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "files/cell_file.hpp"
+#include "files/robot_file.hpp"
+#include "flexcomp/forward.hpp"
+#include "flexcomp/model.hpp"
+#include "planning/segments.hpp"
+
+namespace flexcomp::host {
+
+/// What stands against a pose.
+enum class Obstruction {
+  none,
+  joint_limit,    ///< a reading beyond its limit, or no number
+  bodies_touch,   ///< two bodies of the arm, or one of them and an obstacle
+  tool_too_near,  ///< a reflector or an arm of the tool at a body
+  beam_blocked,   ///< a body too near to the line from the tracker to a reflector
+  facing_away     ///< the beam comes in at a larger angle than a reflector accepts
+};
+
+/// "beam blocked" and so on, for people.
+std::string name_of(Obstruction obstruction);
+
+/// Tests single poses of the nominal arm. What is tested against what:
+///
+/// - *Beam and angle*, where the cell has a tracker: every reflector must be seen. The beam's angle to -N (N is +Z of
+///   Ftool) is at most the acceptance, and the segment from the tracker to the reflector keeps more than
+///   r_i + s * r_s from every body's axis. Arms of the tool do not block beams.
+/// - *Tool*: reflectors, and arms from the origin of Ftool to each of them, keep more than r_i + s * r_s from every body.
+///   A tool without reflectors is its tool point, which is then what the tracker sees. Bodies on frame 6 move with the
+///   tool and are tested against beams only.
+/// - *Mounted near*: where no pose at all lets a reflector (or an arm) keep s from a body of the arm, because the tool is
+///   bolted on beside it, that pair - and this reflector's beam at that body - has to keep 1 instead of s, the ball
+///   itself; if no pose allows that either, 0: not inside the body; and where even this is never so, it is not tested. A
+///   warning says so. (The reference tool on the TX60L: reflector A is 138 mm from the wrist's centre at every pose, and
+///   95 + 3 * 19.05 mm would be 152.) Obstacles and bodies on frame 0 get no such allowance.
+/// - *Arm*: bodies keep more than r_i + r_j from each other and from obstacles. Left out are bodies of the same frame;
+///   neighbours (no frame between theirs has a body), which overlap at their joint; pairs that touch at every pose, as
+///   fat bodies around a joint do; bodies on frame 0 against obstacles, and any other pair whose distance no joint changes.
+///
+/// "At any pose" is judged on some thousand random poses in the joint limits, the same in every run.
+/// Const and thread-safe; about a microsecond a call.
+class Feasibility {
+ public:
+  explicit Feasibility(const RobotFile& robot, const std::optional<Cell>& cell = {});
+
+  /// The first obstruction found, cheap tests first: joint limit, facing, bodies, tool, beam.
+  Obstruction check(const std::array<double, joint_count>& q_rad) const;
+  bool allows(const std::array<double, joint_count>& q_rad) const {
+    return check(q_rad) == Obstruction::none;
+  }
+  /// One sentence for people with names and figures; empty where the pose is allowed.
+  std::string why(const std::array<double, joint_count>& q_rad) const;
+  /// What is not tested, or less strictly than the files ask. Complete sentences.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  /// The cell file, or the robot file where there is no cell.
+  const std::string& source() const { return source_; }
+
+ private:
+  struct Body {
+    Capsule capsule;
+    std::string name;
+    bool obstacle = false;
+    double half_length_m = 0;
+    double largest_clearance_m = 0;  ///< of all below
+    /// Per reflector, m: what reflector and beam, and the arm to it, keep from the axis; below 0: not tested.
+    std::vector<double> reflector_clearance_m;
+    std::vector<double> beam_clearance_m;
+    std::vector<double> arm_clearance_m;
+  };
+  struct Pair {
+    std::size_t first;
+    std::size_t second;
+  };
+  struct Finding {
+    Obstruction obstruction = Obstruction::none;
+    std::size_t first = 0;   ///< joint, reflector, or body
+    std::size_t second = 0;  ///< body
+    double actual = 0;       ///< m or rad
+    double allowed = 0;      ///< m or rad
+    bool arm = false;        ///< the tool's arm to the reflector
+  };
+  using Joints = std::array<double, joint_count>;
+  using LinkFrames = Frames<double, joint_count>;
+
+  using Axes = std::vector<Segment>;  ///< of all bodies, in F0
+
+  void place(const Joints& q_rad, LinkFrames& frames) const;
+  Segment placed(const Body& body, const LinkFrames& frames) const;
+  Eigen::Vector3d placed(const Eigen::Vector3d& in_flange_m, const LinkFrames& frames) const;
+  Finding find(const Joints& q_rad) const;
+  bool find_facing(const LinkFrames& frames, Finding& finding) const;
+  bool find_touch(const Axes& axes, Finding& finding) const;
+  bool find_tool(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
+  bool find_beam(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
+  void choose_pairs(const RobotFile& robot, const std::vector<LinkFrames>& samples);
+  void choose_clearances(const std::vector<LinkFrames>& samples);
+  void warn_of_tracker();
+  std::string reflector_name(std::size_t k) const;
+
+  std::string source_;
+  std::array<LinkShape<double>, joint_count> links_;
+  std::array<JointLimits, joint_count> limits_;
+  std::vector<Body> bodies_;                ///< of the robot, then obstacles
+  std::vector<Pair> pairs_;                 ///< bodies that must not touch
+  std::vector<Eigen::Vector3d> reflector_;  ///< in F6
+  Eigen::Vector3d centre_;                  ///< of the tool, in F6
+  Eigen::Vector3d normal_;                  ///< N in F6
+  double tool_radius_m_ = 0;                ///< from the centre to the farthest reflector
+  bool stand_in_ = false;                   ///< the only reflector is the tool point
+  std::optional<Eigen::Vector3d> tracker_m_;
+  double cos_acceptance_ = 0;
+  double safety_ = 3;
+  double smr_radius_m_ = 0;
+  std::vector<std::string> warnings_;
+};
+
+/// `count` poses that are allowed, uniform within the joint limits, rad.
+/// \throws InputError  naming the cell (or robot) file and how often each obstruction stood against a pose, where fewer
+///                     than about one random pose in a thousand is allowed
+std::vector<std::array<double, joint_count>> feasible_poses(const Feasibility& feasibility,
+                                                            const RobotFile& robot, std::size_t count,
+                                                            std::uint64_t seed);
+
+}  // namespace flexcomp::host
+
+#endif

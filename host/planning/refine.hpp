@@ -1,0 +1,48 @@
+/// \file
+/// The default method: exchange over a few hundred random poses, then all joint angles at once along the gradient of the
+/// criterion, then one pose after another is replaced and the whole refined again.
+#ifndef FLEXCOMP_HOST_PLANNING_REFINE_HPP
+#define FLEXCOMP_HOST_PLANNING_REFINE_HPP
+
+#include <cstdint>
+
+#include "planning/search.hpp"
+
+namespace flexcomp::host {
+
+/// Moves all joints of a set downhill (projected limited-memory BFGS); a pose whose step is not allowed takes a shorter
+/// one or stays. Returns the log fitness, which never grows.
+double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double tolerance,
+               std::uint64_t& evaluations);
+
+struct RefineOptions {
+  std::uint64_t evaluations = 300000;  ///< of the whole search
+  std::size_t candidates = 300;        ///< of the exchange that starts it
+  std::size_t replacements = 60;       ///< random poses tried in place of one
+  std::uint64_t seed = 1;
+};
+
+/// Iterated local search; each step is one start or one replacement with what follows.
+class RefineSearch : public Search {
+ public:
+  RefineSearch(const PlanProblem& problem, const RefineOptions& options)
+      : Search(problem), options_(options) {}
+  void step() override;
+  double progress() const override {
+    return static_cast<double>(evaluations_) / static_cast<double>(options_.evaluations);
+  }
+
+ protected:
+  void save_own(nlohmann::json& state) const override;
+  void load_own(const nlohmann::json& state) override;
+
+ private:
+  RefineOptions options_;
+  std::uint64_t next_ = 0;
+  PoseSet now_;
+  double now_log_ = 0;
+};
+
+}  // namespace flexcomp::host
+
+#endif

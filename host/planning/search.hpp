@@ -1,0 +1,107 @@
+/// \file
+/// The task of choosing poses, and what every method of doing so has in common: small steps that can be watched,
+/// stopped, written down and gone on with.
+#ifndef FLEXCOMP_HOST_PLANNING_SEARCH_HPP
+#define FLEXCOMP_HOST_PLANNING_SEARCH_HPP
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "planning/criterion.hpp"
+#include "planning/pose_information.hpp"
+
+namespace flexcomp::host {
+
+/// A pose of a plan: where, and with which of the payloads to choose from.
+struct PlannedPose {
+  Joints q_rad{};
+  std::size_t payload = 0;
+};
+using PoseSet = std::vector<PlannedPose>;
+
+struct PlanProblem {
+  std::shared_ptr<const PoseInformation> information;
+  Instrument instrument = Instrument::position(1);
+  std::vector<PoseContext> payloads;  ///< contexts that differ in their payload; one or more
+  std::array<JointLimits, joint_count> limits{};
+  std::function<bool(const Joints&)> feasible;  ///< beyond the limits; empty: everything is
+  std::vector<Joints> candidates;               ///< only these; empty: anything within the limits
+  std::size_t poses = 0;                        ///< how many to choose
+  Eigen::MatrixXd known;                        ///< Σ HHᵀ of what has been measured already
+  std::size_t known_poses = 0;
+
+  Criterion criterion(Goal goal = Goal::dual) const;
+  void block(const PlannedPose& pose, Block& out) const;
+  Block block(const PlannedPose& pose) const;
+  std::vector<Block> blocks(const PoseSet& set) const;
+  bool allows(const Joints& q_rad) const;  ///< within the limits and feasible
+  /// What is known before anything is planned, with the weak prior that makes every set comparable: 10,000 units.
+  Information start() const;
+  Information of(const std::vector<Block>& blocks) const;
+  double log_fitness(const PoseSet& set) const;
+
+  /// A feasible pose, uniform within the limits, with a random payload; a random candidate where there are candidates.
+  /// \throws std::runtime_error  after a million refusals in a row
+  PlannedPose random_pose(std::mt19937_64& random) const;
+};
+
+/// Uniform in [0, 1), and an index below `count`.
+double uniform(std::mt19937_64& random);
+std::size_t below(std::size_t count, std::mt19937_64& random);
+/// Independent random numbers for step `index` of a search with this seed: steps can be repeated one by one.
+std::mt19937_64 random_of(std::uint64_t seed, std::uint64_t index);
+
+/// One method at work on one problem.
+class Search {
+ public:
+  explicit Search(const PlanProblem& problem) : problem_(problem) {}
+  virtual ~Search() = default;
+  Search(const Search&) = delete;
+  Search& operator=(const Search&) = delete;
+
+  /// A piece of work; nothing happens where the search is done().
+  virtual void step() = 0;
+  virtual double progress() const = 0;  ///< share of the work that is done, 0 … 1
+  bool done() const { return progress() >= 1; }
+
+  const PoseSet& best() const { return best_; }          ///< empty before the first step
+  double best_log_fitness() const { return best_log_; }  ///< of the dual index, whatever the method looks at
+  std::uint64_t evaluations() const { return evaluations_; }  ///< poses whose H or gain was computed
+  /// Evaluations and log fitness at each improvement, for people.
+  const std::vector<std::pair<std::uint64_t, double>>& history() const { return history_; }
+
+  /// All that the rest of the search depends on: a search that loads it goes on as if it had never stopped.
+  nlohmann::json save() const;
+  /// \throws nlohmann::json::exception, std::runtime_error  where the state does not fit
+  void load(const nlohmann::json& state);
+
+ protected:
+  virtual void save_own(nlohmann::json& state) const = 0;
+  virtual void load_own(const nlohmann::json& state) = 0;
+  /// Takes a set as the best where it is better.
+  bool offer(const PoseSet& set, double log_fitness);
+  /// Takes it in any case: for a method that looks at something else.
+  void replace_best(const PoseSet& set, double log_fitness);
+
+  const PlanProblem& problem_;
+  std::uint64_t evaluations_ = 0;
+
+ private:
+  PoseSet best_;
+  double best_log_ = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<std::uint64_t, double>> history_;
+};
+
+nlohmann::json to_json(const PoseSet& set);
+PoseSet pose_set_of(const nlohmann::json& json);
+
+}  // namespace flexcomp::host
+
+#endif

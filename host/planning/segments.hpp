@@ -1,0 +1,24 @@
+/// \file
+/// Exact distances between segments.
+#ifndef FLEXCOMP_HOST_PLANNING_SEGMENTS_HPP
+#define FLEXCOMP_HOST_PLANNING_SEGMENTS_HPP
+
+#include <Eigen/Core>
+
+namespace flexcomp::host {
+
+/// All points from `from` to `to`; one point where they are equal.
+struct Segment {
+  Eigen::Vector3d from;
+  Eigen::Vector3d to;
+};
+
+/// Squared distance of a point from a segment, m².
+double squared_distance(const Eigen::Vector3d& point, const Segment& segment);
+
+/// Squared distance of two segments, m²; of any length and direction, also crossing, parallel and of no length.
+double squared_distance(const Segment& a, const Segment& b);
+
+}  // namespace flexcomp::host
+
+#endif
