@@ -8,6 +8,10 @@ const std::vector<StudyEntry>& studies() {
        study_fig2},
       {"fig3", "accuracy of the geometric parameters by model size, without noise", study_fig3},
       {"fig4", "pose and position model, varied and settled orientation", study_fig4},
+      {"fig8", "planned against DETMAX, M-LM against least squares, and what raises the limit", study_fig8},
+      {"table3", "residuals on 30 other poses with three models, 14 planned poses", study_table3},
+      {"poses", "score over the number of poses: is 14 the least?", study_poses},
+      {"payload", "gain of the flexible model over the payload", study_payload},
   };
   return all;
 }

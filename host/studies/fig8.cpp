@@ -1,0 +1,160 @@
+// Fig. 8: 14 planned poses and M-LM against DETMAX and least squares, each crossed with the other, and what raises the
+// limit honestly.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+
+#include "studies/calibrations.hpp"
+#include "studies/planned.hpp"
+#include "studies/study.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+struct Case {
+  const char* poses;
+  const char* estimator;
+  Planning planning;
+  Method method;
+  std::optional<double> paper_n1;  // TX60L
+  std::optional<double> paper_n2;
+};
+
+/// What is changed beside the paper's set-up.
+struct Variation {
+  const char* name;
+  std::size_t poses = 14;
+  std::vector<double> payloads_kg;  // empty: the arm's
+  double tool_length = 1;           // times as far from the flange
+  bool tolerances = false;
+};
+
+/// Round figures of the kind that a maker's drawing states; not made from the truth.
+std::vector<Tolerance> usual_tolerances() {
+  std::vector<Tolerance> list;
+  const auto add = [&](const char* pattern, double expected, double sigma) {
+    list.push_back({pattern, expected, sigma, "fig8", 0});
+  };
+  add("link*.theta_deg", 0, 0.1);
+  add("link*.d_mm", 0, 0.3);
+  add("link*.a_mm", 0, 0.1);
+  add("link*.alpha_deg", 0, 0.05);
+  add("link*.beta_deg", 0, 0.05);
+  return list;
+}
+
+StudyRow row_of(const StudiedArm& arm, const NoiseLevel& noise, const std::string& poses,
+                const std::string& estimator, const Experiment& experiment, const Score& score,
+                bool has_limit) {
+  StudyRow row;
+  row.labels = {arm.name, noise.name, poses, estimator};
+  row.ours = score.mean;
+  row.uncertainty = score.error_of_mean();
+  if (has_limit) row.limit = experiment.cramer_rao_score();
+  row.remark = fmt::format("{} parameters, 1 % after {:.0f} repeats", experiment.fitted(),
+                           score.repeats_for_one_percent());
+  return row;
+}
+
+}  // namespace
+
+Study study_fig8(const StudyOptions& options) {
+  Study study;
+  study.name = "fig8";
+  study.title = "Fig. 8: planned poses and M-LM against DETMAX and least squares";
+  study.quantity = "mean score of the parameters (1 is perfect)";
+  study.label_names = {"arm", "noise", "14 poses by", "estimator"};
+  const std::vector<Case> cases{
+      {"SAPSO (paper's proposal)", "M-LM", Planning::sapso, Method::m_lm, 0.958, 0.927},
+      {"SAPSO", "least squares", Planning::sapso, Method::least_squares, {}, {}},
+      {"DETMAX (paper's baseline)", "least squares", Planning::detmax, Method::least_squares, {}, {}},
+      {"DETMAX", "M-LM", Planning::detmax, Method::m_lm, {}, {}},
+      {"random", "M-LM", Planning::random, Method::m_lm, {}, {}},
+      {"our plan", "M-LM", Planning::ours, Method::m_lm, {}, {}},
+      {"our plan", "our default", Planning::ours, Method::ours, {}, {}},
+  };
+  for (const StudiedArm& arm : options.arms) {
+    const double payload = arm.robot.nominal.payload_kg;
+    const std::vector<Variation> variations{
+        {"our plan, two payloads", 14, {payload, 5 * payload}, 1, false},
+        {"our plan, tool 3 times as long", 14, {}, 3, false},
+        {"our plan, tolerances as priors", 14, {}, 1, true},
+        {"our plan, 40 poses", 40, {}, 1, false},
+        {"our plan, 40 poses, two payloads, long tool", 40, {payload, 5 * payload}, 3, true},
+    };
+    std::map<Planning, std::vector<StudiedPose>> planned;
+    double done = 0;
+    const double all = static_cast<double>(4 + variations.size());
+    for (const Case& c : cases) {
+      if (planned.count(c.planning) != 0) continue;
+      options.say(arm.name + ": " + c.poses, done++ / all);
+      planned[c.planning] = planned_poses(arm, 14, c.planning, options.seed);
+    }
+    std::vector<std::pair<StudiedArm, std::vector<StudiedPose>>> varied;
+    for (const Variation& v : variations) {
+      options.say(fmt::format("{}: {}", arm.name, v.name), done++ / all);
+      StudiedArm changed = arm;
+      for (double& x : changed.robot.nominal.tool_xyz_m) x *= v.tool_length;
+      for (double& x : changed.robot.nominal.payload_com_m) x *= v.tool_length;
+      varied.emplace_back(changed,
+                          planned_poses(changed, v.poses, Planning::ours, options.seed, v.payloads_kg));
+    }
+    Curves curves;
+    curves.described = "Score by method and noise, " + arm.name;
+    curves.x_name = "row of the table";
+    curves.y_name = "score";
+    for (const NoiseLevel& noise : options.noises) {
+      const bool n1 = noise.position_sigma_m == noise_n1.position_sigma_m;
+      const std::size_t first = study.rows.size();
+      for (const Case& c : cases) {
+        ExperimentOptions how;
+        how.method = c.method;
+        how.noise = noise;
+        const Experiment experiment(arm, planned.at(c.planning), how);
+        study.rows.push_back(row_of(arm, noise, c.poses, c.estimator, experiment,
+                                    repeated_score(experiment, options.repeats, options.seed), true));
+        if (arm.name == "TX60L") study.rows.back().paper = n1 ? c.paper_n1 : c.paper_n2;
+      }
+      for (std::size_t v = 0; v < variations.size(); ++v) {
+        ExperimentOptions how;
+        how.method = Method::ours;
+        how.noise = noise;
+        if (variations[v].tolerances) how.tolerances = usual_tolerances();
+        const Experiment experiment(varied[v].first, varied[v].second, how);
+        study.rows.push_back(row_of(arm, noise, variations[v].name, "our default", experiment,
+                                    repeated_score(experiment, options.repeats, options.seed),
+                                    !variations[v].tolerances));
+      }
+      Curve ours{fmt::format("{} reached", noise.name), {}};
+      Curve limit{fmt::format("{} limit", noise.name), {}};
+      for (std::size_t k = first; k < study.rows.size(); ++k) {
+        const double at = static_cast<double>(k - first + 1);
+        ours.points.push_back({at, *study.rows[k].ours});
+        if (study.rows[k].limit) limit.points.push_back({at, *study.rows[k].limit});
+      }
+      curves.curves.push_back(ours);
+      curves.curves.push_back(limit);
+    }
+    study.figures.push_back({arm.name + ": rows of the table from top to bottom.", curves});
+    study.notes.push_back(arm.about);
+  }
+  study.notes.push_back(
+      "The limit is the score of estimates that are normal around the truth with the smallest covariance "
+      "that an "
+      "unbiased estimator can have at these poses. The paper's 95.8 % (N1) and 92.7 % (N2) lie above it for "
+      "its own "
+      "set-up (TX60L, 1.108 kg, 14 poses): they need a set-up or a score that it does not print.");
+  study.notes.push_back(
+      "SAPSO with M-LM and with least squares, and DETMAX with both, say where a difference comes from: from "
+      "the poses. "
+      "M-LM and one linear step differ by the curvature of the model only.");
+  study.notes.push_back(
+      "All poses are within limits, clear of the arm and seen by a tracker 2.5 m before it. Tolerances as "
+      "priors are 0.1 "
+      "deg, 0.3 mm (d), 0.1 mm (a), 0.05 deg: no unbiased estimator, hence no limit.");
+  return study;
+}
+
+}  // namespace flexcomp::host

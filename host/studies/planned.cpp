@@ -1,0 +1,104 @@
+#include "studies/planned.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "files/cell_file.hpp"
+#include "planning/detmax.hpp"
+#include "planning/feasibility.hpp"
+#include "planning/refine.hpp"
+#include "planning/sapso.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+/// Eq. 33 with Eq. 30 as the paper can only have meant it in a simulation: squared errors of the least squares estimate
+/// against the truth, in units, for one draw of noise that stays the same for all sets.
+class OracleObjective {
+ public:
+  OracleObjective(const PlanProblem& problem, std::uint64_t seed) : problem_(problem) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    noise_.resize(problem.instrument.rows(), static_cast<Eigen::Index>(problem.poses));
+    for (Eigen::Index k = 0; k < noise_.size(); ++k) noise_(k) = normal(random);
+  }
+
+  double operator()(const PoseSet& set) const {
+    const std::vector<Block> blocks = problem_.blocks(set);
+    const Information information = problem_.of(blocks);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(information.unknowns());
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+      right += blocks[k] * noise_.col(static_cast<Eigen::Index>(k));
+    const double omin = (information.inverse() * right).squaredNorm();
+    return omin / problem_.criterion().o1(information.figures());
+  }
+
+ private:
+  const PlanProblem& problem_;
+  Eigen::MatrixXd noise_;
+};
+
+}  // namespace
+
+std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count, Planning how,
+                                       std::uint64_t seed, const std::vector<double>& payloads_kg) {
+  Cell cell;
+  cell.tracker_m = Eigen::Vector3d(2.5, 0, 0.3);
+  const Feasibility feasibility(arm.robot, cell);
+
+  PlanProblem problem;
+  problem.instrument = Instrument::pose(arm.robot.position_sigma_m, arm.robot.orientation_sigma_rad);
+  for (const double payload :
+       payloads_kg.empty() ? std::vector<double>{arm.robot.nominal.payload_kg} : payloads_kg) {
+    problem.payloads.push_back(default_context<double>(arm.robot.nominal));
+    problem.payloads.back().payload_kg = payload;
+  }
+  std::vector<Sight> like;
+  for (const PoseContext& context : problem.payloads) like.push_back({{}, context, problem.instrument});
+  problem.information = std::make_shared<PoseInformation>(arm.robot, ModelKind::full, false, like);
+  problem.limits = arm.robot.nominal.limits;
+  problem.feasible = [&](const Joints& q) { return feasibility.allows(q); };
+  problem.poses = count;
+
+  std::unique_ptr<Search> search;
+  switch (how) {
+    case Planning::random:
+      break;
+    case Planning::detmax: {
+      DetmaxOptions options;
+      options.seed = seed;
+      search = std::make_unique<DetmaxSearch>(problem, options);
+      break;
+    }
+    case Planning::sapso: {
+      SapsoOptions options;
+      options.seed = seed;
+      options.objective = OracleObjective(problem, seed);
+      search = std::make_unique<SapsoSearch>(problem, options);
+      break;
+    }
+    case Planning::ours: {
+      RefineOptions options;
+      options.seed = seed;
+      search = std::make_unique<RefineSearch>(problem, options);
+      break;
+    }
+  }
+  PoseSet set;
+  if (search) {
+    while (!search->done()) search->step();
+    set = search->best();
+  } else {
+    std::mt19937_64 random = random_of(seed, 0);
+    for (std::size_t k = 0; k < count; ++k) set.push_back(problem.random_pose(random));
+  }
+  std::vector<StudiedPose> poses;
+  for (const PlannedPose& pose : set)
+    poses.push_back({pose.q_rad, problem.payloads[pose.payload].payload_kg});
+  return poses;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,82 @@
+// How many poses are needed: the paper says that 14 is the least.
+#include <fmt/format.h>
+
+#include "studies/calibrations.hpp"
+#include "studies/planned.hpp"
+#include "studies/study.hpp"
+
+namespace flexcomp::host {
+
+Study study_poses(const StudyOptions& options) {
+  Study study;
+  study.name = "poses";
+  study.title = "Score over the number of poses";
+  study.quantity = "mean score of the parameters (1 is perfect)";
+  study.label_names = {"arm", "noise", "poses", "chosen"};
+  const std::vector<std::size_t> counts{8, 10, 12, 14, 16, 20, 24, 30, 40};
+  for (const StudiedArm& arm : options.arms) {
+    std::vector<std::vector<StudiedPose>> planned;
+    for (const std::size_t n : counts) {
+      options.say(fmt::format("{}: planning {} poses", arm.name, n),
+                  static_cast<double>(planned.size()) / static_cast<double>(counts.size()));
+      planned.push_back(planned_poses(arm, n, Planning::ours, options.seed));
+    }
+    Curves curves;
+    curves.described = "Score over the number of poses, " + arm.name;
+    curves.x_name = "poses";
+    curves.y_name = "score";
+    for (const NoiseLevel& noise : options.noises) {
+      Curve ours{fmt::format("{} planned", noise.name), {}};
+      Curve limit{fmt::format("{} limit", noise.name), {}};
+      Curve random{fmt::format("{} random", noise.name), {}};
+      double at_14 = 0;
+      double before_14 = 0;
+      double after_14 = 0;
+      for (std::size_t k = 0; k < counts.size(); ++k) {
+        for (const bool is_planned : {true, false}) {
+          ExperimentOptions how;
+          how.method = Method::ours;
+          how.noise = noise;
+          how.insist = true;
+          const Experiment experiment(
+              arm, is_planned ? planned[k] : planned_poses(arm, counts[k], Planning::random, options.seed),
+              how);
+          const Score score = repeated_score(experiment, options.repeats, options.seed);
+          StudyRow row;
+          row.labels = {arm.name, noise.name, fmt::format("{}", counts[k]),
+                        is_planned ? "planned" : "random"};
+          row.ours = score.mean;
+          row.uncertainty = score.error_of_mean();
+          row.limit = experiment.cramer_rao_score();
+          if (!experiment.missing().empty())
+            row.remark = fmt::format("{} parameters not known", experiment.missing().size());
+          study.rows.push_back(row);
+          const double n = static_cast<double>(counts[k]);
+          (is_planned ? ours : random).points.push_back({n, score.mean});
+          if (!is_planned) continue;
+          limit.points.push_back({n, *row.limit});
+          if (counts[k] == 12) before_14 = score.mean;
+          if (counts[k] == 14) at_14 = score.mean;
+          if (counts[k] == 16) after_14 = score.mean;
+        }
+      }
+      curves.curves.push_back(ours);
+      curves.curves.push_back(limit);
+      curves.curves.push_back(random);
+      study.notes.push_back(
+          fmt::format("{} {}: planned, two poses more gain {:.4f} from 12 to 14 and {:.4f} from 14 to 16.",
+                      arm.name, noise.name, at_14 - before_14, after_14 - at_14));
+    }
+    study.figures.push_back({arm.name + ".", curves});
+    study.notes.push_back(arm.about);
+  }
+  study.notes.push_back(
+      "The paper says that 14 is the least number of poses (its preliminary work). Nothing happens at 14: "
+      "every parameter "
+      "has a value from 8 planned poses on, and the score goes on rising as the errors fall with the root of "
+      "the number "
+      "of poses. What 14 planned poses reach, random ones need more poses for.");
+  return study;
+}
+
+}  // namespace flexcomp::host
