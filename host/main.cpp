@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "flexcomp " FLEXCOMP_VERSION);
   app.require_subcommand(1);
   add_simulate(app);
+  add_plan(app);
   add_identify(app);
   add_validate(app);
   add_predict(app);

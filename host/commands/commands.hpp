@@ -9,6 +9,7 @@
 namespace flexcomp::host {
 
 void add_simulate(CLI::App& app);
+void add_plan(CLI::App& app);
 void add_identify(CLI::App& app);
 void add_validate(CLI::App& app);
 void add_predict(CLI::App& app);

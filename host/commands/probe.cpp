@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "bus/progress_bar.hpp"
+#include "commands/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/answers.hpp"
 #include "commands/bus_options.hpp"

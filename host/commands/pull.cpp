@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "bus/progress_bar.hpp"
+#include "commands/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "bus/progress_bar.hpp"
+#include "commands/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"

@@ -19,9 +19,7 @@ CandidatePool make_pool(const PlanProblem& problem, std::size_t count, std::mt19
     for (std::size_t k = 0; k < count; ++k) pool.poses.push_back(problem.random_pose(random));
   } else {
     pool.may_repeat = false;
-    for (const Joints& q : problem.candidates) {
-      for (std::size_t p = 0; p < problem.payloads.size(); ++p) pool.poses.push_back({q, p});
-    }
+    pool.poses = problem.candidates;
   }
   pool.blocks.resize(problem.information->unknowns(), static_cast<Eigen::Index>(pool.size()) * pool.rows);
   Block h;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 
 #include "planning/exchange.hpp"
 
@@ -191,7 +192,8 @@ void RefineSearch::save_own(nlohmann::json& state) const {
 
 void RefineSearch::load_own(const nlohmann::json& state) {
   next_ = state.at("step").get<std::uint64_t>();
-  now_ = pose_set_of(state.at("now"));
+  now_.clear();
+  if (!state.at("now").empty()) now_ = pose_set_of(state.at("now"), problem_);
   now_log_ = state.at("now_log").get<double>();
 }
 

@@ -16,7 +16,7 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
                std::uint64_t& evaluations);
 
 struct RefineOptions {
-  std::uint64_t evaluations = 300000;  ///< of the whole search
+  std::uint64_t evaluations = 400000;  ///< of the whole search
   std::size_t candidates = 300;        ///< of the exchange that starts it
   std::size_t replacements = 60;       ///< random poses tried in place of one
   std::uint64_t seed = 1;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
 namespace flexcomp::host {
 
@@ -111,10 +113,13 @@ void SapsoSearch::load_own(const nlohmann::json& state) {
   leader_ = state.at("leader").get<std::size_t>();
   swarm_.clear();
   for (const nlohmann::json& p : state.at("swarm")) {
-    swarm_.push_back({pose_set_of(p.at("at")), p.at("speed").get<std::vector<Joints>>(),
-                      pose_set_of(p.at("best")), p.at("value").get<double>(),
+    swarm_.push_back({pose_set_of(p.at("at"), problem_), p.at("speed").get<std::vector<Joints>>(),
+                      pose_set_of(p.at("best"), problem_), p.at("value").get<double>(),
                       p.at("best_value").get<double>()});
+    if (swarm_.back().speed.size() != problem_.poses) throw std::runtime_error("another number of poses");
   }
+  if (leader_ >= std::max<std::size_t>(swarm_.size(), 1))
+    throw std::runtime_error("a leader that is not there");
 }
 
 }  // namespace flexcomp::host

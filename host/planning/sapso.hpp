@@ -17,13 +17,13 @@ double adaptive_inertia(double f, double f_min, double f_avg, double w_min, doub
 
 struct SapsoOptions {
   std::size_t particles = 500;
-  std::uint64_t iterations = 300;
+  std::uint64_t iterations = 600;
   double own = 2;    ///< c1, pull to the particle's own best
   double swarm = 2;  ///< c2, pull to the swarm's best
   double least_inertia = 0.5;
   double largest_inertia = 0.8;
   /// Largest step of a joint in one iteration, as a share of its range: c1 = c2 = 2 does not converge by itself.
-  double largest_speed = 0.1;
+  double largest_speed = 0.05;
   std::uint64_t seed = 1;
   /// What is made small; empty: the dual index with Omin in expectation. The oracle form of the paper (Eq. 30, with the
   /// true parameters) is given by whoever knows them. best_log_fitness() is then the logarithm of this.

@@ -1,6 +1,7 @@
 #include "planning/search.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 namespace flexcomp::host {
 
@@ -12,7 +13,7 @@ constexpr double weak_prior = 1e-8;
 }  // namespace
 
 Criterion PlanProblem::criterion(Goal goal) const {
-  return {information->parameters(), static_cast<double>(poses + known_poses), goal};
+  return {information->parameters(), static_cast<double>(poses + known.size()), goal};
 }
 
 void PlanProblem::block(const PlannedPose& pose, Block& out) const {
@@ -38,16 +39,15 @@ bool PlanProblem::allows(const Joints& q_rad) const {
   return !feasible || feasible(q_rad);
 }
 
-Information PlanProblem::start() const {
-  Information out(information->nuisance(), information->parameters(), weak_prior);
-  if (known.size() > 0) out.assign(known);
-  return out;
+void PlanProblem::take_as_known(std::vector<Block> blocks) {
+  known = std::move(blocks);
+  known_sum = sum_of_squares(known, information->unknowns());
 }
 
 Information PlanProblem::of(const std::vector<Block>& blocks) const {
   Information out(information->nuisance(), information->parameters(), weak_prior);
   Eigen::MatrixXd m = sum_of_squares(blocks, information->unknowns());
-  if (known.size() > 0) m += known;
+  if (!known.empty()) m += known_sum;
   out.assign(m);
   return out;
 }
@@ -59,11 +59,7 @@ double PlanProblem::log_fitness(const PoseSet& set) const {
 PlannedPose PlanProblem::random_pose(std::mt19937_64& random) const {
   constexpr int most = 1000000;
   PlannedPose pose;
-  if (!candidates.empty()) {
-    pose.q_rad = candidates[below(candidates.size(), random)];
-    pose.payload = below(payloads.size(), random);
-    return pose;
-  }
+  if (!candidates.empty()) return candidates[below(candidates.size(), random)];
   for (int k = 0; k < most; ++k) {
     for (std::size_t j = 0; j < joint_count; ++j) {
       pose.q_rad[j] = limits[j].min_rad + (limits[j].max_rad - limits[j].min_rad) * uniform(random);
@@ -106,9 +102,14 @@ nlohmann::json to_json(const PoseSet& set) {
   return out;
 }
 
-PoseSet pose_set_of(const nlohmann::json& json) {
+PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem) {
   PoseSet set;
   for (const nlohmann::json& p : json) set.push_back({p.at(0).get<Joints>(), p.at(1).get<std::size_t>()});
+  if (set.size() != problem.poses) throw std::runtime_error("another number of poses");
+  for (const PlannedPose& p : set) {
+    if (p.payload >= problem.payloads.size()) throw std::runtime_error("a payload that is not there");
+    if (!problem.allows(p.q_rad)) throw std::runtime_error("a pose that cannot be taken");
+  }
   return set;
 }
 
@@ -126,12 +127,8 @@ void Search::load(const nlohmann::json& state) {
   evaluations_ = state.at("evaluations").get<std::uint64_t>();
   history_ = state.at("history").get<std::vector<std::pair<std::uint64_t, double>>>();
   if (state.contains("best")) {
-    best_ = pose_set_of(state.at("best"));
+    best_ = pose_set_of(state.at("best"), problem_);
     best_log_ = state.at("log_fitness").get<double>();
-    if (best_.size() != problem_.poses) throw std::runtime_error("another number of poses");
-    for (const PlannedPose& p : best_) {
-      if (p.payload >= problem_.payloads.size()) throw std::runtime_error("another list of payloads");
-    }
   }
   load_own(state);
 }

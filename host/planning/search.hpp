@@ -32,18 +32,18 @@ struct PlanProblem {
   std::vector<PoseContext> payloads;  ///< contexts that differ in their payload; one or more
   std::array<JointLimits, joint_count> limits{};
   std::function<bool(const Joints&)> feasible;  ///< beyond the limits; empty: everything is
-  std::vector<Joints> candidates;               ///< only these; empty: anything within the limits
+  PoseSet candidates;                           ///< only these, each once; empty: anything within the limits
   std::size_t poses = 0;                        ///< how many to choose
-  Eigen::MatrixXd known;                        ///< Σ HHᵀ of what has been measured already
-  std::size_t known_poses = 0;
+  std::vector<Block> known;                     ///< what has been measured already, see take_as_known()
+  Eigen::MatrixXd known_sum;
 
   Criterion criterion(Goal goal = Goal::dual) const;
   void block(const PlannedPose& pose, Block& out) const;
   Block block(const PlannedPose& pose) const;
   std::vector<Block> blocks(const PoseSet& set) const;
   bool allows(const Joints& q_rad) const;  ///< within the limits and feasible
-  /// What is known before anything is planned, with the weak prior that makes every set comparable: 10,000 units.
-  Information start() const;
+  void take_as_known(std::vector<Block> blocks);
+  /// What is known with these blocks besides; a prior so weak (10,000 units) that it only makes too few poses comparable.
   Information of(const std::vector<Block>& blocks) const;
   double log_fitness(const PoseSet& set) const;
 
@@ -100,7 +100,8 @@ class Search {
 };
 
 nlohmann::json to_json(const PoseSet& set);
-PoseSet pose_set_of(const nlohmann::json& json);
+/// \throws nlohmann::json::exception, std::runtime_error  where it is no set of this problem
+PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem);
 
 }  // namespace flexcomp::host
 

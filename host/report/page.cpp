@@ -290,6 +290,37 @@ std::string free_section(const PageSection& section) {
   return out + "</section>\n";
 }
 
+std::string plan_section(const PagePlan& plan) {
+  std::string out = "<section><h2>The plan</h2>\n<div class=\"plots wide\">\n";
+  out += figure(plot_coverage(plan),
+                plan.known_q_rad.empty()
+                    ? "Where the poses lie between the limits of each joint."
+                    : "Where the poses lie between the limits of each joint; orange, a little "
+                      "higher: measured already.");
+  out += figure(plot_progress(plan.progress), "The criterion of the best set so far, over the work done.");
+  out += "</div>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">pose</th>";
+  for (std::size_t j = 0; j < joint_count; ++j) out += fmt::format("<th scope=\"col\">q{} [deg]</th>", j + 1);
+  if (!plan.payload_kg.empty()) out += "<th scope=\"col\">payload [kg]</th>";
+  out += "</tr></thead><tbody>\n";
+  for (std::size_t k = 0; k < plan.q_rad.size(); ++k) {
+    out += fmt::format("<tr><th scope=\"row\">{}</th>", k + 1);
+    for (const double v : plan.q_rad[k]) out += fmt::format("<td>{:.3f}</td>", degrees(v));
+    if (!plan.payload_kg.empty()) out += fmt::format("<td>{:g}</td>", plan.payload_kg[k]);
+    out += "</tr>\n";
+  }
+  out +=
+      "</tbody></table></div></section>\n<section><h2>What to expect</h2>\n<p>One standard deviation of each "
+      "parameter that these poses make known, for the noise of the robot file.</p>\n<div "
+      "class=\"scroll\"><table "
+      "class=\"parameters\"><thead><tr><th scope=\"col\">parameter</th><th scope=\"col\">±</th><th "
+      "scope=\"col\">unit</th></tr></thead><tbody>\n";
+  for (const auto& [name, sigma] : plan.expected) {
+    out += fmt::format("<tr><th scope=\"row\">{}</th><td>{:.2g}</td><td>{}</td></tr>\n", escaped(name), sigma,
+                       unit_of_name(name));
+  }
+  return out + "</tbody></table></div></section>\n";
+}
+
 /// Only places beside this page or inside it: a report never leads into the network.
 bool is_local(const std::string& href) {
   return !href.empty() && href.find(':') == std::string::npos && !href.starts_with("//");
@@ -318,6 +349,7 @@ std::string html(const Page& page) {
     }
     out += "</dl>\n";
   }
+  if (page.plan) out += plan_section(*page.plan);
   for (const PagePoses& set : page.poses) out += poses_section(set);
   for (const PageSection& section : page.sections) out += free_section(section);
   out += results_table(page);

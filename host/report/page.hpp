@@ -75,11 +75,23 @@ struct PageLink {
   std::string text;
 };
 
+/// A plan of measurement poses.
+struct PagePlan {
+  std::vector<std::pair<double, double>> progress;  ///< evaluations and criterion at each improvement
+  std::vector<std::array<double, joint_count>> q_rad;
+  std::vector<double> payload_kg;                            ///< per pose, or empty
+  std::vector<std::array<double, joint_count>> known_q_rad;  ///< measured already
+  std::array<std::pair<double, double>, joint_count> limits_rad{};
+  std::vector<std::pair<std::string, double>>
+      expected;  ///< standard deviation per parameter, unit as the name says
+};
+
 struct Page {
   std::string title;                ///< "Calibration of staubli-tx60l"
   std::string summary;              ///< what came out, in a sentence or two for somebody in a hurry
   std::vector<std::string> doubts;  ///< why the result must not be relied on; shown first, in words
   std::vector<PageFact> facts;      ///< data file, poses, parameters, condition, chi-square per dof …
+  std::optional<PagePlan> plan;
   std::vector<PagePoses> poses;
   std::vector<PageParameter> parameters;
   std::vector<PageConfounded> confounded;

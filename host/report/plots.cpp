@@ -347,4 +347,57 @@ std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t j
   return plot.done();
 }
 
+std::string plot_progress(const std::vector<std::pair<double, double>>& progress) {
+  double low = HUGE_VAL, high = 0, most = 1;
+  for (const auto& [work, value] : progress) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+    most = std::max(most, work);
+  }
+  if (progress.empty()) low = 0, high = 1;
+  const double margin = std::max(0.05 * (high - low), 1e-3 * high);
+  const Scale y{low - margin, high + margin, false};
+  const Scale x{0, most / 1e3, false};
+  Plot plot("Criterion of the best set of poses over the work done");
+  plot.y_axis(y.ticks(4), y, "criterion");
+  plot.x_axis(x.ticks(5), x, "thousand evaluations");
+  std::string d;
+  for (std::size_t k = 0; k < progress.size(); ++k) {
+    const double at = px(x.at(progress[k].first / 1e3));
+    const double up = py(y.at(progress[k].second));
+    d += k == 0 ? fmt::format("M{:.1f} {:.1f}", at, up) : fmt::format("H{:.1f}V{:.1f}", at, up);
+  }
+  if (!progress.empty()) d += fmt::format("H{:.1f}", px(1));
+  plot.path(d, "line after");
+  plot.path(progress.empty() ? "" : dot(px(x.at(progress[0].first / 1e3)), py(y.at(progress[0].second))),
+            "dots after");
+  return plot.done();
+}
+
+std::string plot_coverage(const PagePlan& plan) {
+  const Scale x{0, 100, false};
+  const Scale y{0.4, static_cast<double>(joint_count) + 0.6, false};
+  Plot plot("Where the poses lie between the limits of each joint");
+  std::vector<Tick> joints;
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    joints.push_back({static_cast<double>(joint_count - j), fmt::format("q{}", j + 1)});
+  }
+  plot.y_axis(joints, y, "joint");
+  plot.x_axis(x.ticks(5), x, "% of the way from the lower to the upper limit");
+  const auto dots = [&](const std::vector<std::array<double, joint_count>>& poses, double shift) {
+    std::string d;
+    for (const auto& q : poses) {
+      for (std::size_t j = 0; j < joint_count; ++j) {
+        const auto& [lower, upper] = plan.limits_rad[j];
+        d += dot(px(std::clamp((q[j] - lower) / (upper - lower), 0.0, 1.0)),
+                 py(y.at(static_cast<double>(joint_count - j) + shift)));
+      }
+    }
+    return d;
+  };
+  plot.path(dots(plan.known_q_rad, 0.2), "dots before");
+  plot.path(dots(plan.q_rad, 0), "dots after");
+  return plot.done();
+}
+
 }  // namespace flexcomp::host

@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "report/page.hpp"
@@ -46,6 +47,11 @@ std::string plot_sorted(const ErrorPairs& errors);
 std::string plot_histogram(const ErrorPairs& errors);
 /// The three components of the position error that is left, against each joint's angle: what has a shape is not noise.
 std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint);
+
+/// The criterion of the best set so far over the work done.
+std::string plot_progress(const std::vector<std::pair<double, double>>& progress);
+/// Where the poses of a plan lie between each joint's limits; those that were measured already above them.
+std::string plot_coverage(const PagePlan& plan);
 
 }  // namespace flexcomp::host
 

@@ -1,4 +1,4 @@
-#include "bus/progress_bar.hpp"
+#include "commands/progress_bar.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -21,7 +21,7 @@ ProgressBar::~ProgressBar() {
   if (drawn_) std::fputs("\r\033[K", stderr);
 }
 
-void ProgressBar::show(std::size_t done, std::size_t total) {
+void ProgressBar::show(std::size_t done, std::size_t total, const std::string& note) {
   if (!active_ || total == 0) return;
   const auto now = steady_clock::now();
   if (now < next_) return;
@@ -32,8 +32,8 @@ void ProgressBar::show(std::size_t done, std::size_t total) {
   const double passed = std::chrono::duration<double>(now - start_).count();
   const double left =
       done == 0 ? 0 : passed * static_cast<double>(total - std::min(done, total)) / static_cast<double>(done);
-  fmt::print(stderr, "\r\033[K{} [{}{}] {} of {}, {:.0f} s left", what_, std::string(filled, '#'),
-             std::string(width - filled, ' '), done, total, left);
+  fmt::print(stderr, "\r\033[K{} [{}{}] {} of {}, {:.0f} s left{}{}", what_, std::string(filled, '#'),
+             std::string(width - filled, ' '), done, total, left, note.empty() ? "" : "; ", note);
   std::fflush(stderr);
 }
 

@@ -1,7 +1,7 @@
 /// \file
 /// A bar on the terminal for what takes longer than a second.
-#ifndef FLEXCOMP_HOST_BUS_PROGRESS_BAR_HPP
-#define FLEXCOMP_HOST_BUS_PROGRESS_BAR_HPP
+#ifndef FLEXCOMP_HOST_COMMANDS_PROGRESS_BAR_HPP
+#define FLEXCOMP_HOST_COMMANDS_PROGRESS_BAR_HPP
 
 #include <chrono>
 #include <cstddef>
@@ -18,7 +18,8 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  void show(std::size_t done, std::size_t total);
+  /// `note` stands behind the bar, where there is something else to say.
+  void show(std::size_t done, std::size_t total, const std::string& note = {});
 
   /// For functions that report their progress; valid as long as the bar.
   std::function<void(std::size_t, std::size_t)> callback() {
