@@ -82,11 +82,26 @@ double log_visibility(std::span<const Eigen::Vector3d> points, std::size_t moved
 }  // namespace
 
 RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m) {
-  const Eigen::Vector3d from = centroid(template_m);
-  const Eigen::Vector3d to = centroid(measured_m);
+  return fit_rigid(measured_m, template_m, std::vector<double>(template_m.size(), 1));
+}
+
+RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m,
+                   std::span<const double> sigma_m) {
+  double total = 0;
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+  std::vector<double> weight;
+  for (std::size_t k = 0; k < template_m.size(); ++k) {
+    weight.push_back(1 / (sigma_m[k] * sigma_m[k]));
+    from += weight[k] * template_m[k];
+    to += weight[k] * measured_m[k];
+    total += weight[k];
+  }
+  from /= total;
+  to /= total;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < template_m.size(); ++k) {
-    covariance += (measured_m[k] - to) * (template_m[k] - from).transpose();
+    covariance += weight[k] * (measured_m[k] - to) * (template_m[k] - from).transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   // Three or four points in a plane leave the third direction open: the determinant says which way it must point.
@@ -144,16 +159,22 @@ bool on_one_line(std::span<const Eigen::Vector3d> points_m) {
 
 Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
                                             std::span<const Eigen::Vector3d> template_m, double sigma_m) {
+  return fit_information(pose, template_m, std::vector<double>(template_m.size(), sigma_m));
+}
+
+Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
+                                            std::span<const Eigen::Vector3d> template_m,
+                                            std::span<const double> sigma_m) {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-  for (const Eigen::Vector3d& t : template_m) {
-    const Eigen::Vector3d r = pose.rotation * t;
+  for (std::size_t k = 0; k < template_m.size(); ++k) {
+    const Eigen::Vector3d r = pose.rotation * template_m[k];
     // A point moves by dp + phi x r.
     Eigen::Matrix<double, 3, 6> j;
     j.leftCols<3>().setIdentity();
     j.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
-    information += j.transpose() * j;
+    information += j.transpose() * j / (sigma_m[k] * sigma_m[k]);
   }
-  return information / (sigma_m * sigma_m);
+  return information;
 }
 
 double misfit_probability(double chi2, std::size_t dof) {

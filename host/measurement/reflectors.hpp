@@ -22,6 +22,10 @@ struct RigidFit {
 /// Least squares over all points (Arun, Umeyama). Needs three points that are not on one line.
 RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m);
 
+/// The same with a standard deviation for each point, m, which all of its coordinates share.
+RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m,
+                   std::span<const double> sigma_m);
+
 /// Frame of the paper (Section 3.2): origin the foot of the perpendicular from B on AC, X from B to it, Y from C to A,
 /// Z = X x Y. Returns the pose of that frame in the frame of the points.
 Pose<double> reflector_frame(std::span<const Eigen::Vector3d> points_m);
@@ -36,6 +40,9 @@ bool on_one_line(std::span<const Eigen::Vector3d> points_m);
 /// points have the standard deviation sigma_m in each coordinate.
 Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
                                             std::span<const Eigen::Vector3d> template_m, double sigma_m);
+Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
+                                            std::span<const Eigen::Vector3d> template_m,
+                                            std::span<const double> sigma_m);
 
 /// Probability of a chi-square of 3 or 6 degrees of freedom (three or four points) above this value.
 double misfit_probability(double chi2, std::size_t dof);
