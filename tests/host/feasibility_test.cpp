@@ -607,6 +607,52 @@ TEST(Feasibility, ManyThreadsMayAsk) {
   for (const auto& a : answers) EXPECT_EQ(a, alone);
 }
 
+TEST(Feasibility, BodiesOfTheRobotFilesHangTogether) {
+  // Each body begins inside the one before it, however the arm stands: a wrong frame or sign would tear them apart.
+  Random random(21);
+  for (const char* name : {"tx60l", "rx160l", "ur5", "ur10"}) {
+    const RobotFile robot = robot_of(name);
+    ASSERT_GE(robot.capsules.size(), 3U);
+    for (int k = 0; k < 200; ++k) {
+      const auto frames = chain(robot, random.pose(robot));
+      for (std::size_t i = 0; i + 1 < robot.capsules.size(); ++i) {
+        const Capsule& a = robot.capsules[i];
+        const Capsule& b = robot.capsules[i + 1];
+        const V start = apply(frames[b.frame], b.from_m);
+        ASSERT_LT(to_segment(start, apply(frames[a.frame], a.from_m), apply(frames[a.frame], a.to_m)),
+                  a.radius_m)
+            << name << ", capsules " << i + 1 << " and " << i + 2;
+      }
+      // The last one ends at the wrist: not farther from the flange than link 6 is long.
+      const Capsule& last = robot.capsules.back();
+      ASSERT_LT((apply(frames[last.frame], last.to_m) - apply(frames[6], V::Zero())).norm(),
+                robot.nominal.links[5].d_m + 1e-9)
+          << name;
+    }
+  }
+}
+
+TEST(Feasibility, TheReferenceRobotHasThePapersBodies) {
+  // Section 3.2: O_f1 O_1 375 mm, r 115; O_f2 O_f3 400 mm, r 88; O_3 O_4 450 mm, r 95.
+  const RobotFile robot = robot_of("tx60l");
+  const std::array<double, 3> length{0.375, 0.4, 0.45};
+  const std::array<double, 3> radius{0.115, 0.088, 0.095};
+  Random random(22);
+  const auto frames = chain(robot, random.pose(robot));
+  const auto at = [&](std::size_t k, bool end) {
+    const Capsule& c = robot.capsules[k];
+    return apply(frames[c.frame], end ? c.to_m : c.from_m);
+  };
+  ASSERT_EQ(robot.capsules.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR((at(k, true) - at(k, false)).norm(), length[k], 1e-12);
+    EXPECT_EQ(robot.capsules[k].radius_m, radius[k]);
+  }
+  EXPECT_NEAR((at(1, false) - at(0, true)).norm(), 0.02, 1e-12);  // the shoulder offset, along axis 2
+  EXPECT_NEAR((at(2, false) - at(1, true)).norm(), 0, 1e-12);
+  EXPECT_NEAR((at(2, true) - apply(frames[4], V::Zero())).norm(), 0, 1e-12);
+}
+
 TEST(Feasibility, BodiesAndLimitsDoNotMakeAnotherArm) {
   RobotFile robot = robot_of("rx160l");
   const auto hash = flexcomp::nominal_hash(robot.nominal);
