@@ -11,8 +11,8 @@
 #include <cstddef>
 #include <exception>
 #include <fstream>
-#include <iterator>
 #include <map>
+#include <sstream>
 
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
@@ -83,8 +83,11 @@ class Tree {
  public:
   explicit Tree(const std::string& path) : path_(path) {
     std::ifstream stream(path, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
     if (!stream) throw InputError(path, 0, "", "a file that can be read", "none");
+    std::ostringstream all;
+    all << stream.rdbuf();
+    if (stream.bad() || all.fail()) throw InputError(path, 0, "", "a file that can be read", "nothing in it");
+    const std::string text = all.str();
     // Once for the lines, which liburdfdom does not tell.
     TiXmlDocument xml;
     xml.Parse(text.c_str());
