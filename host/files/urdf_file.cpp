@@ -101,6 +101,11 @@ class Tree {
                        robot == nullptr ? "no element" : "<" + robot->ValueStr() + ">");
     }
     for (const TiXmlElement* e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+      if (e->ValueStr().starts_with("xacro:")) {
+        throw InputError(path, static_cast<std::size_t>(std::max(0, e->Row())), "",
+                         "a URDF, as xacro writes it out (xacro FILE > FILE.urdf)",
+                         "<" + e->ValueStr() + ">");
+      }
       const char* name = e->Attribute("name");
       if (name != nullptr)
         line_[e->ValueStr() + " " + name] = static_cast<std::size_t>(std::max(0, e->Row()));

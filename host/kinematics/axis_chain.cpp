@@ -73,7 +73,7 @@ NominalLink link_to(const AxisLine& next) {
   const Eigen::Vector3d& w = next.direction;
   const double sine = std::hypot(w.x(), w.y());
   NominalLink link;
-  if (sine > std::sin(common_normal_from_rad)) {
+  if (sine > std::sin(parallel_within_rad)) {
     // x along z × w; the feet of the common normal on both axes.
     const Eigen::Vector3d x(-w.y() / sine, w.x() / sine, 0);
     link.theta_rad = std::atan2(x.y(), x.x());

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "catalogue/catalogue.hpp"
 #include "files/robot_file.hpp"
 #include "files/urdf_file.hpp"
 #include "flexcomp/linear.hpp"
@@ -35,14 +36,10 @@ struct LinkChain {
   std::array<double, 4> tool_wxyz{{1, 0, 0, 0}};
 };
 
-/// Axes that are nearer to parallel or antiparallel than this have no common normal worth its name: its feet lie
-/// beyond four times the distance of the drawing's points, and run off to infinity as the angle goes to zero.
-constexpr double common_normal_from_rad = 15 * 3.14159265358979323846 / 180;
-
 /// Any lines: crossing, intersecting, parallel, nearly parallel, antiparallel, the same.
 ///
-/// Eq. 1 has five numbers for the four that a directed line has, so one is free. Where the common normal of two
-/// successive axes is well defined, beta = 0 and the link is the drawing's of Denavit and Hartenberg; of its two
+/// Eq. 1 has five numbers for the four that a directed line has, so one is free. Where two successive axes are not
+/// parallel (parallel_within_rad, as for what is identified), beta = 0 and the link is the drawing's of Denavit and Hartenberg; of its two
 /// readings the one with |theta| <= 90 degrees. Else d = 0 and beta takes what is left of the direction (Hayati):
 /// lengths stay of the size of the arm. F6 has its z axis along the flange's or across it but never against it
 /// (alpha_6 = 180 degrees where the flange looks against axis 6), and is the flange itself where that is possible.

@@ -491,6 +491,8 @@ TEST(UrdfRefusals, FilesThatAreNone) {
   refused("<robot name=\"x\">\n<link name=\"a\"/>\n</joint></robot>", "", {"bad.urdf:3", "XML"});
   refused("<sdf version=\"1.6\"/>", "", {"<robot>", "found <sdf>"});
   refused("<robot name=\"x\"/>", "", {"URDF"});
+  refused("<robot name=\"x\" xmlns:xacro=\"u\">\n<xacro:arm prefix=\"\"/></robot>", "",
+          {":2", "xacro FILE >", "<xacro:arm>"});
   refused(replaced(kuka, " name=\"kuka-kr6-r900-sixx\"", ""), "", {"URDF", "name"});
   refused(replaced(kuka, "0.455 0 0", "0.455 0"), "", {"URDF"});
   refused(replaced(kuka, "0.455 0 0", "0.455 nan 0"), "", {"URDF"});
