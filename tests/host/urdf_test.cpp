@@ -90,6 +90,7 @@ TEST(RobotsOfTheProject, MoveAsTheirSourcesDo) {
   arms::Random random(1);
   for (const Sourced& s : {Sourced{"kuka-kr6-r900.yaml", drawn::kuka_kr6_r900(), turned_about_x()},
                            Sourced{"abb-irb120.yaml", drawn::abb_irb120(), Pose<double>()},
+                           Sourced{"rx160l.yaml", drawn::rx160l(), Pose<double>()},
                            Sourced{"tx60l.yaml", drawn::tx60l(), foot_to_shoulder}}) {
     RobotFile robot = load_robot(robots + s.file);
     // What is mounted is the project's own; the source ends at the flange.

@@ -146,6 +146,13 @@ inline Arm tx60l() {
           {{}, {0, -quarter, 0}, {}},       {{}, {0, quarter, 0}, {}}};
 }
 
+/// Staubli RX160L, base (at the height of joint 2) to tool0: ROS-Industrial's staubli,
+/// staubli_rx160_support/urdf/rx160l_macro.xacro, whose base is 0.55 m above base_link, as joint 1 is.
+inline Arm rx160l() {
+  return {{{0, 0, 0}, {}, {0, 0, 1}}, {{0.15, 0, 0}, {}, {0, 1, 0}},  {{0, 0, 0.825}, {}, {0, 1, 0}},
+          {{0, 0, 0}, {}, {0, 0, 1}}, {{0, 0, 0.925}, {}, {0, 1, 0}}, {{0, 0, 0.11}, {}, {0, 0, 1}}};
+}
+
 }  // namespace drawn
 
 #endif
