@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
   add_report(app);
   add_export(app);
   add_study(app);
+  add_import(app);
   // The help text would end in the middle of a line.
   for (CLI::App* command : app.get_subcommands({})) command->footer(command->get_footer() + "\n");
   try {

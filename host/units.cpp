@@ -35,6 +35,11 @@ std::optional<double> parse_si(std::string_view text, const Unit& unit) {
   return si;
 }
 
+double tidied(double si, const Unit& unit) {
+  const long double value = std::round(static_cast<long double>(si) * unit.divide / unit.multiply * 1e10L);
+  return static_cast<double>(value / 1e10L * unit.multiply / unit.divide + 0.0L);
+}
+
 std::string format_si(double si, const Unit& unit) {
   const long double value = static_cast<long double>(si) * unit.divide / unit.multiply;
   std::array<char, 64> text{};

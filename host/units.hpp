@@ -41,6 +41,10 @@ constexpr double degrees(double radians) {
 /// in long double and is rounded once. Nothing where the text is not a finite number.
 std::optional<double> parse_si(std::string_view text, const Unit& unit);
 
+/// To ten decimals of the file's unit, without a negative zero: what arithmetic made 89.99999999999999 is 90 again, and
+/// no arm notices the 1e-10 mm.
+double tidied(double si, const Unit& unit);
+
 /// The fewest digits (6 or more where they are not zeros) from which parse_si() gives back the identical double.
 std::string format_si(double si, const Unit& unit);
 

@@ -651,7 +651,7 @@ std::vector<Parameter> parameters_of(const TermSet& set, const Nominal& robot) {
 // --- the model of the paper -----------------------------------------------------------------------------------------
 
 std::array<bool, joint_count> takes_beta(const Nominal& robot) {
-  const double parallel = std::cos(radians(1));
+  const double parallel = std::cos(parallel_within_rad);
   std::array<bool, joint_count> beta{};
   for (std::size_t i = 0; i + 1 < joint_count; ++i) {
     // The next axis is Rot(x,alpha) Rot(y,beta) e_z, seen from this one.

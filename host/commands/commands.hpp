@@ -22,6 +22,7 @@ void add_probe(CLI::App& app);
 void add_report(CLI::App& app);
 void add_export(CLI::App& app);
 void add_study(CLI::App& app);
+void add_import(CLI::App& app);
 
 }  // namespace flexcomp::host
 

@@ -16,6 +16,7 @@
 #include "files/quaternion.hpp"
 #include "files/write_file.hpp"
 #include "files/yaml_field.hpp"
+#include "files/yaml_text.hpp"
 
 namespace flexcomp::host {
 
@@ -361,24 +362,11 @@ void read_head(const YamlField& root, const RobotFile& robot, Calibration& c) {
 
 // --- writing ------------------------------------------------------------------------------------------------------
 
-/// A number as YAML 1.1 readers also take it for one: 1e-05 is text to them, 1.0e-05 is not.
-std::string yaml_number(std::string text) {
-  const std::size_t e = text.find('e');
-  if (e != std::string::npos && text.find('.') == std::string::npos) text.insert(e, ".0");
-  return text;
-}
-
-std::string number(double si, const Unit& unit) { return yaml_number(format_si(si, unit)); }
+std::string number(double si, const Unit& unit) { return yaml_number(si, unit); }
 
 /// Uncertainties are known to few digits.
 std::string sigma_number(double si, const Unit& unit) {
   return yaml_number(fmt::format("{:.6g}", si / unit.si_per_file_unit()));
-}
-
-std::string quoted(const std::string& text) {
-  YAML::Emitter emitter;
-  emitter << YAML::DoubleQuoted << text;
-  return emitter.c_str();
 }
 
 std::string frame_text(const Frame& f) {
@@ -514,10 +502,10 @@ Calibration load_calibration(const std::string& path, const RobotFile& robot) {
 std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   canonical(c.terms, robot.nominal);  // throws where a term would be lost below
   std::string text = "# Differences from the nominal robot, each with its standard deviation (sigma_…).\n";
-  text += "robot: " + quoted(robot.name) + "\n";
-  if (c.nominal_hash) text += "nominal_hash: " + quoted(hex(*c.nominal_hash)) + "\n";
-  if (!c.tool_version.empty()) text += "flexcomp_version: " + quoted(c.tool_version) + "\n";
-  if (!c.date.empty()) text += "date: " + quoted(c.date) + "\n";
+  text += "robot: " + yaml_quoted(robot.name) + "\n";
+  if (c.nominal_hash) text += "nominal_hash: " + yaml_quoted(hex(*c.nominal_hash)) + "\n";
+  if (!c.tool_version.empty()) text += "flexcomp_version: " + yaml_quoted(c.tool_version) + "\n";
+  if (!c.date.empty()) text += "date: " + yaml_quoted(c.date) + "\n";
   if (c.sequence) text += fmt::format("sequence: {}\n", *c.sequence);
   if (c.frames) {
     text += "frames:  # measured = f * base … tool * e\n";
@@ -539,8 +527,9 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   if (!c.confounded.empty()) text += "confounded:  # left out, and what carries it\n";
   for (const Confounded& confounded : c.confounded) {
     std::vector<std::string> with;
-    for (const std::string& other : confounded.with) with.push_back(quoted(other));
-    text += fmt::format("  - {{parameter: {}, with: {}}}\n", quoted(confounded.parameter), list_text(with));
+    for (const std::string& other : confounded.with) with.push_back(yaml_quoted(other));
+    text +=
+        fmt::format("  - {{parameter: {}, with: {}}}\n", yaml_quoted(confounded.parameter), list_text(with));
   }
   if (!c.at_bound.empty()) text += "at_bound:  # as small as physics allows; 95 % sure to be below (SI)\n";
   for (const AtBound& bound : c.at_bound) {
@@ -558,9 +547,9 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
       std::vector<std::string> row;
       for (Eigen::Index k = 0; k <= r; ++k)
         row.push_back(yaml_number(fmt::format("{:.9g}", c.covariance->factor(r, k))));
-      text +=
-          fmt::format("  - {{parameter: {}, row: [{}]}}\n",
-                      quoted(c.covariance->parameters[static_cast<std::size_t>(r)]), fmt::join(row, ", "));
+      text += fmt::format("  - {{parameter: {}, row: [{}]}}\n",
+                          yaml_quoted(c.covariance->parameters[static_cast<std::size_t>(r)]),
+                          fmt::join(row, ", "));
     }
   }
   return text;

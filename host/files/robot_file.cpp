@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "files/yaml_field.hpp"
+#include "files/yaml_text.hpp"
 
 namespace flexcomp::host {
 
@@ -13,13 +15,27 @@ namespace {
 
 std::array<double, 3> array3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-void read_joint(const YamlField& joint, std::size_t i, RobotFile& robot) {
+double length(const YamlField& joint, const char* key, LongLinks long_links) {
+  const YamlField field = joint.at(key);
+  const double value = field.number(unit::mm);
+  if (long_links == LongLinks::refused && std::abs(value) > longest_link_m) {
+    throw field.error(fmt::format(
+        "at most {:.0f} mm either way. Calibrated tables of arms with nearly parallel axes hold such "
+        "lengths, "
+        "which cancel on the next link; 'flexcomp import' of this file gives the same arm with beta_deg in "
+        "their place",
+        longest_link_m / unit::mm.si_per_file_unit()));
+  }
+  return value;
+}
+
+void read_joint(const YamlField& joint, std::size_t i, LongLinks long_links, RobotFile& robot) {
   joint.require_keys({"theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "min_deg", "max_deg",
                       "max_speed_deg_s", "gear_ratio"});
   NominalLink& link = robot.nominal.links[i];
   link.theta_rad = joint.at("theta_deg").number(unit::degree);
-  link.d_m = joint.at("d_mm").number(unit::mm);
-  link.a_m = joint.at("a_mm").number(unit::mm);
+  link.d_m = length(joint, "d_mm", long_links);
+  link.a_m = length(joint, "a_mm", long_links);
   link.alpha_rad = joint.at("alpha_deg").number(unit::degree);
   link.beta_rad = joint.number_or("beta_deg", unit::degree, 0);
   JointLimits& limits = robot.nominal.limits[i];
@@ -51,11 +67,73 @@ void read_tool(const YamlField& tool, RobotFile& robot) {
   }
 }
 
+std::string list_text(const Eigen::Vector3d& v, const Unit& unit) {
+  return fmt::format("[{}, {}, {}]", yaml_number(v.x(), unit), yaml_number(v.y(), unit),
+                     yaml_number(v.z(), unit));
+}
+
+Eigen::Vector3d vector3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+std::string joint_text(const RobotFile& robot, std::size_t i) {
+  const NominalLink& link = robot.nominal.links[i];
+  const JointLimits& limits = robot.nominal.limits[i];
+  std::string text = fmt::format(
+      "  - {{theta_deg: {}, d_mm: {}, a_mm: {}, alpha_deg: {}, beta_deg: {}, min_deg: {}, max_deg: {}",
+      yaml_number(link.theta_rad, unit::degree), yaml_number(link.d_m, unit::mm),
+      yaml_number(link.a_m, unit::mm), yaml_number(link.alpha_rad, unit::degree),
+      yaml_number(link.beta_rad, unit::degree), yaml_number(limits.min_rad, unit::degree),
+      yaml_number(limits.max_rad, unit::degree));
+  if (robot.max_speed_rad_s[i] > 0)
+    text += ", max_speed_deg_s: " + yaml_number(robot.max_speed_rad_s[i], unit::degree);
+  if (robot.gear_ratio[i] > 0) text += ", gear_ratio: " + yaml_number(robot.gear_ratio[i], unit::si);
+  return text + "}\n";
+}
+
 }  // namespace
+
+std::string robot_text(const RobotFile& robot, const std::vector<std::string>& comment) {
+  const NominalRobot<joint_count>& nominal = robot.nominal;
+  std::string text;
+  for (std::string line : comment) {
+    // Names come from elsewhere, and none may end the comment.
+    std::replace_if(
+        line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
+    text += line.empty() ? "#\n" : "# " + line + "\n";
+  }
+  text += "name: " + yaml_quoted(robot.name) + "\njoints:\n";
+  for (std::size_t i = 0; i < joint_count; ++i) text += joint_text(robot, i);
+  text += "gravity_m_s2: " + list_text(vector3(nominal.gravity_m_s2), unit::si) + "\n";
+  const auto& q = nominal.tool_wxyz;
+  text += fmt::format("tool: {{xyz_mm: {}, quaternion_wxyz: [{}, {}, {}, {}]",
+                      list_text(vector3(nominal.tool_xyz_m), unit::mm), yaml_number(q[0], unit::si),
+                      yaml_number(q[1], unit::si), yaml_number(q[2], unit::si), yaml_number(q[3], unit::si));
+  if (!robot.reflectors_m.empty()) {
+    text += ", reflectors_mm: {";
+    for (std::size_t k = 0; k < robot.reflectors_m.size(); ++k)
+      text +=
+          fmt::format("{}{}: {}", k == 0 ? "" : ", ", "abcd"[k], list_text(robot.reflectors_m[k], unit::mm));
+    text += "}";
+  }
+  text += fmt::format("}}\npayload: {{mass_kg: {}, com_mm: {}}}\n", yaml_number(nominal.payload_kg, unit::si),
+                      list_text(vector3(nominal.payload_com_m), unit::mm));
+  text += "reference_temperature_c: " + yaml_number(nominal.reference_temperature_c, unit::si) + "\n";
+  if (robot.has_noise) {
+    text += fmt::format("noise: {{position_mm: {}, orientation_deg: {}}}\n",
+                        yaml_number(robot.position_sigma_m, unit::mm),
+                        yaml_number(robot.orientation_sigma_rad, unit::degree));
+  }
+  if (!robot.capsules.empty()) text += "capsules:\n";
+  for (const Capsule& c : robot.capsules) {
+    text += fmt::format("  - {{frame: {}, from_mm: {}, to_mm: {}, radius_mm: {}}}\n", c.frame,
+                        list_text(c.from_m, unit::mm), list_text(c.to_m, unit::mm),
+                        yaml_number(c.radius_m, unit::mm));
+  }
+  return text;
+}
 
 namespace {
 
-RobotFile read_robot(const YamlField& root) {
+RobotFile read_robot(const YamlField& root, LongLinks long_links) {
   const std::string& path = root.file();
   root.require_keys(
       {"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise", "capsules"});
@@ -67,7 +145,7 @@ RobotFile read_robot(const YamlField& root) {
   const YamlField list = root.at("joints");
   const std::vector<YamlField> joints = list.items();
   if (joints.size() != joint_count) throw list.error("a list of exactly six joints");
-  for (std::size_t i = 0; i < joint_count; ++i) read_joint(joints[i], i, robot);
+  for (std::size_t i = 0; i < joint_count; ++i) read_joint(joints[i], i, long_links, robot);
 
   if (const auto gravity = root.find("gravity_m_s2")) {
     robot.nominal.gravity_m_s2 = array3(gravity->vector3(unit::si));
@@ -99,10 +177,12 @@ RobotFile read_robot(const YamlField& root) {
 
 }  // namespace
 
-RobotFile load_robot(const std::string& path) { return read_robot(YamlField::load(path)); }
+RobotFile load_robot(const std::string& path, LongLinks long_links) {
+  return read_robot(YamlField::load(path), long_links);
+}
 
 RobotFile parse_robot(const std::string& text, const std::string& name) {
-  return read_robot(YamlField::parse(text, name));
+  return read_robot(YamlField::parse(text, name), LongLinks::refused);
 }
 
 }  // namespace flexcomp::host

@@ -29,14 +29,24 @@ struct RobotFile {
   std::vector<Capsule> capsules;
 };
 
+/// Links longer than any arm's: d that ran off. Where two axes are nearly parallel, a maker's table of calibrated
+/// Denavit-Hartenberg parameters holds hundreds of metres of d on one link and as much against it on the next; nothing can
+/// be identified from there.
+constexpr double longest_link_m = 20;
+enum class LongLinks { refused, taken };
+
 /// Reads and checks a robot file.
 /// \throws InputError  file absent or no YAML; a key that is unknown (with the nearest known one), missing, given twice
 ///                     or of the wrong kind; not six joints; a number that is not finite; min >= max; a quaternion
-///                     whose norm is off 1 by more than 1e-3
-RobotFile load_robot(const std::string& path);
+///                     whose norm is off 1 by more than 1e-3; |d| or |a| above longest_link_m
+RobotFile load_robot(const std::string& path, LongLinks long_links = LongLinks::refused);
 
 /// The same from the text of a robot file; `name` stands for its path in messages.
 RobotFile parse_robot(const std::string& text, const std::string& name);
+
+/// A robot file from which load_robot() gives the identical robot back; what is unknown or absent is left out. `comment`
+/// goes before it, as lines without their #.
+std::string robot_text(const RobotFile& robot, const std::vector<std::string>& comment);
 
 }  // namespace flexcomp::host
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <random>
 
@@ -57,8 +58,12 @@ TEST(RobotFile, ReadsTheContractsExample) {
 }
 
 TEST(RobotFile, EveryRobotOfTheProjectLoads) {
-  for (const char* name : {"tx60l.yaml", "rx160l.yaml", "ur5.yaml", "ur10.yaml"})
-    EXPECT_NO_THROW(load_robot(robots + name));
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(robots)) {
+    EXPECT_NO_THROW(load_robot(entry.path().string())) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 6U);
 }
 
 TEST(RobotFile, NameAndJointsAreEnough) {
@@ -121,6 +126,17 @@ TEST(RobotFile, QuaternionsAreNormalisedWithinAThousandth) {
   refused(with("[1.002, 0, 0, 0]"), 9, "tool.quaternion_wxyz", {"norm 1.002"});
   refused(with("[0, 0, 0, 0]"), 9, "tool.quaternion_wxyz");
   refused(with("[1, 0, 0]"), 9, "tool.quaternion_wxyz", {"four numbers"});
+}
+
+TEST(RobotFile, RefusesLengthsOfNoArm) {
+  for (const char* key : {"a_mm: 400", "d_mm: 450"}) {
+    const std::string name = std::string(key).substr(0, 4);
+    const std::size_t joint = name == "a_mm" ? 2 : 4;
+    const std::string field = "joints[" + std::to_string(joint) + "]." + name;
+    EXPECT_NO_THROW(load(replaced(good, key, name + ": -20000")));
+    refused(replaced(good, key, name + ": -20001"), joint + 2, field,
+            {"20000 mm", "beta_deg", "flexcomp import"});
+  }
 }
 
 TEST(RobotFile, RefusesImpossibleValues) {
