@@ -22,9 +22,11 @@ using Joints = std::array<double, 6>;
 using V = Eigen::Vector3d;
 
 #if defined(__SANITIZE_ADDRESS__)
-constexpr int poses_per_cell = 4000;
+constexpr int poses_per_cell = 2000;
+constexpr int judge_samples = 200;
 #else
 constexpr int poses_per_cell = 72000;
+constexpr int judge_samples = 1000;
 #endif
 
 const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
@@ -62,11 +64,11 @@ double to_segment(const V& p, const V& a, const V& b) {
 }
 
 /// The distance to a segment is convex along a line: three-part search, which knows nothing of perpendiculars.
-double searched(const Segment& a, const Segment& b) {
+double searched(const Segment& a, const Segment& b, int steps = 120) {
   double low = 0;
   double high = 1;
   const auto at = [&](double s) { return to_segment(a.from + s * (a.to - a.from), b.from, b.to); };
-  for (int k = 0; k < 120; ++k) {
+  for (int k = 0; k < steps; ++k) {
     const double s = low + (high - low) / 3;
     const double t = high - (high - low) / 3;
     (at(s) < at(t) ? high : low) = at(s) < at(t) ? t : s;
@@ -205,18 +207,18 @@ class Judge {
     if (reflectors_.empty()) reflectors_.push_back(V::Zero());
     Random random(99);
     std::vector<std::array<Eigen::Matrix4d, 8>> samples;
-    for (int k = 0; k < 1000; ++k) samples.push_back(chain(robot, random.pose(robot)));
+    for (int k = 0; k < judge_samples; ++k) samples.push_back(chain(robot, random.pose(robot)));
     const std::size_t own = robot.capsules.size();
     for (std::size_t i = 0; i < own; ++i) {
       for (std::size_t j = i + 1; j < bodies_.size(); ++j) {
         double least = 1e9;
         double most = 0;
         for (const auto& frames : samples) {
-          const double d = searched(axis(i, frames), axis(j, frames));
+          const double d = searched(axis(i, frames), axis(j, frames), 40);
           least = std::min(least, d);
           most = std::max(most, d);
         }
-        bool tested = most - least > 1e-7;
+        bool tested = most - least > 1e-5;
         if (j < own) {
           const std::size_t f = std::min(bodies_[i].frame, bodies_[j].frame);
           const std::size_t g = std::max(bodies_[i].frame, bodies_[j].frame);
@@ -235,7 +237,7 @@ class Judge {
           const V at = apply(frames[7], reflectors_[k]);
           const Segment line = axis(i, frames);
           ball = std::max(ball, to_segment(at, line.from, line.to));
-          arm = std::max(arm, searched({apply(frames[7], V::Zero()), at}, line));
+          arm = std::max(arm, searched({apply(frames[7], V::Zero()), at}, line, 40));
         }
         const bool fixed = bodies_[i].frame == 0;
         ball_.push_back(clearance(bodies_[i].radius_m, fixed ? 1e9 : ball));
