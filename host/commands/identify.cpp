@@ -128,6 +128,35 @@ std::string payload_advice(const std::vector<PayloadGain>& gains, const TermSet&
   return text;
 }
 
+std::string repeats_text(const PureError& e) {
+  std::string text = fmt::format(
+      "  {} rows repeat {} poses: they scatter by {:.4f} mm per axis (95 %: {:.4f} … {:.4f})", e.rows,
+      e.groups, e.sigma_position_m * 1e3, e.position_interval_m.low * 1e3, e.position_interval_m.high * 1e3);
+  if (e.sigma_orientation_rad > 0) text += fmt::format(" and {:.4f} deg", degrees(e.sigma_orientation_rad));
+  text += fmt::format(", {:.3g} times the declared noise", std::sqrt(e.chi2_per_dof_whitened));
+  if (e.lack_of_fit_p) {
+    text += fmt::format("; the model {} (lack of fit p = {:.2g})",
+                        *e.lack_of_fit_p < 0.01 ? "misses more than that" : "misses no more than that",
+                        *e.lack_of_fit_p);
+  }
+  return text;
+}
+
+nlohmann::ordered_json repeats_json(const std::optional<PureError>& e) {
+  if (!e) return nullptr;
+  const auto or_null = [](const std::optional<double>& v) {
+    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json();
+  };
+  return {{"groups", e->groups},
+          {"rows", e->rows},
+          {"sigma_mm", e->sigma_position_m * 1e3},
+          {"sigma_mm_interval95", {e->position_interval_m.low * 1e3, e->position_interval_m.high * 1e3}},
+          {"sigma_deg", degrees(e->sigma_orientation_rad)},
+          {"chi2_per_dof", e->chi2_per_dof_whitened},
+          {"lack_of_fit_f", or_null(e->lack_of_fit_f)},
+          {"lack_of_fit_p", or_null(e->lack_of_fit_p)}};
+}
+
 void Identify::run() const {
   const RobotFile robot_file = load_robot(robot);
   const DataFile file = load_data(data, robot_file, {force});
@@ -175,6 +204,7 @@ void Identify::run() const {
                   r.condition, r.o1));
   common.say(fmt::format("{}: written", out));
 
+  if (r.pure_error) common.say(repeats_text(*r.pure_error));
   if (!r.known.payload_gains.empty())
     common.say(payload_advice(r.known.payload_gains, r.fit.estimate.set, r.known.fitted.parameters));
 
@@ -217,6 +247,7 @@ void Identify::run() const {
                      {"chi2_per_dof", r.fit.chi2_per_dof()},
                      {"degrees_of_freedom", r.fit.degrees_of_freedom},
                      {"outlier_lines", outlier_lines},
+                     {"pure_error", repeats_json(r.pure_error)},
                      {"before", to_json(r.before)},
                      {"after", to_json(r.after)},
                      {"values", parameters}});

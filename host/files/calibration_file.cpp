@@ -533,7 +533,7 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   }
   if (!c.at_bound.empty()) text += "at_bound:  # as small as physics allows; 95 % sure to be below (SI)\n";
   for (const AtBound& bound : c.at_bound) {
-    text += fmt::format("  - {{parameter: {}, upper_95_si: {}}}\n", quoted(bound.parameter),
+    text += fmt::format("  - {{parameter: {}, upper_95_si: {}}}\n", yaml_quoted(bound.parameter),
                         sigma_number(bound.upper_95, unit::si));
   }
   if (!c.residuals.empty()) text += "residuals:\n";

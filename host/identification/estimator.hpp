@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "identification/residuals.hpp"
+#include "interval.hpp"
 
 namespace flexcomp::host {
 
@@ -17,12 +18,6 @@ struct EstimatorOptions {
   bool robust = true;  ///< false: every row counts in full
   /// Called after each accepted step with the iteration and the cost; may be empty.
   std::function<void(int, double)> progress;
-};
-
-/// Of one parameter, SI.
-struct Interval {
-  double low = 0;
-  double high = 0;
 };
 
 struct Fit {

@@ -178,9 +178,15 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   const auto model = prepare(out.fit.estimate.set, robot, source);
   out.residuals = residuals(out.fit.estimate, *model, rows);
   out.after = statistics(out.residuals, rows);
+  std::vector<Observation> in_full;
   for (std::size_t k = 0; k < out.fit.weight.size(); ++k) {
-    if (out.fit.weight[k] < 1) out.outliers.push_back(k);
+    if (out.fit.weight[k] < 1) {
+      out.outliers.push_back(k);
+    } else {
+      in_full.push_back(rows[k]);
+    }
   }
+  if (fitted.count() > 0) out.pure_error = pure_error(in_full, out.fit.chi2, out.fit.degrees_of_freedom);
 
   const Eigen::VectorXd units = units_of(fitted, out.fit.estimate.set);
   keep_what_was_identified(out.calibration, out.fit.estimate.set, fitted, sigma_units.cwiseProduct(units));

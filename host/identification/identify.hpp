@@ -15,6 +15,7 @@
 #include "identification/frames.hpp"
 #include "identification/knowable.hpp"
 #include "identification/statistics.hpp"
+#include "measurement/repeats.hpp"
 
 namespace flexcomp::host {
 
@@ -54,6 +55,8 @@ struct Identification {
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where the model has them, per row
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<std::size_t> outliers;   ///< rows that do not count in full, by index
+  std::optional<PureError>
+      pure_error;  ///< of repeated rows, outliers left out; nothing where none are repeated
   /// Why the result must not be relied on; empty where it may.
   std::vector<std::string> doubts;
 };

@@ -8,15 +8,10 @@
 #include <optional>
 #include <vector>
 
+#include "interval.hpp"
 #include "measurement/observation.hpp"
 
 namespace flexcomp::host {
-
-/// 95 % interval.
-struct Interval {
-  double low = 0;
-  double high = 0;
-};
 
 /// Pooled over all groups of repeats, each about its own mean.
 struct PureError {
