@@ -66,19 +66,6 @@ std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<Stu
   return rows;
 }
 
-std::vector<StudiedPose> random_poses(const StudiedArm& arm, std::size_t count, std::uint64_t seed,
-                                      const std::vector<double>& payloads_kg) {
-  Observation like;
-  like.context = default_context<double>(arm.robot.nominal);
-  std::vector<StudiedPose> poses;
-  for (const Observation& row : random_observations(arm.robot, {like}, count, seed)) {
-    const double payload =
-        payloads_kg.empty() ? arm.robot.nominal.payload_kg : payloads_kg[poses.size() % payloads_kg.size()];
-    poses.push_back({row.q_rad, payload});
-  }
-  return poses;
-}
-
 Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                        const ExperimentOptions& options)
     : arm_(arm), options_(options), clean_(clean_rows(arm, poses, options.orientations, options.noise)) {

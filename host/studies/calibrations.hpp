@@ -4,7 +4,6 @@
 #define FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -19,12 +18,6 @@
 #include "studies/paper.hpp"
 
 namespace flexcomp::host {
-
-/// Where to measure.
-struct StudiedPose {
-  std::array<double, joint_count> q_rad{};
-  double payload_kg = 0;
-};
 
 /// How parameters come from residuals.
 enum class Method {
@@ -92,10 +85,6 @@ class Experiment {
 /// Rows as an instrument without noise would see them; weights are those of the noise level.
 std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                                     bool orientations, const NoiseLevel& noise);
-
-/// Random poses within the limits, payloads in turn (none given: the robot's).
-std::vector<StudiedPose> random_poses(const StudiedArm& arm, std::size_t count, std::uint64_t seed,
-                                      const std::vector<double>& payloads_kg = {});
 
 /// Does work(k) for k = 0 … count - 1 on all cores; whatever they are, the same results.
 void for_each_repeat(std::size_t count, const std::function<void(std::size_t)>& work);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "studies/calibrations.hpp"
@@ -69,6 +70,7 @@ Study study_fig8(const StudyOptions& options) {
   const std::vector<Case> cases{
       {"SAPSO (paper's proposal)", "M-LM", Planning::sapso, Method::m_lm, 0.958, 0.927},
       {"SAPSO", "least squares", Planning::sapso, Method::least_squares, {}, {}},
+      {"SAPSO, Omin in expectation", "M-LM", Planning::sapso_expected, Method::m_lm, {}, {}},
       {"DETMAX (paper's baseline)", "least squares", Planning::detmax, Method::least_squares, {}, {}},
       {"DETMAX", "M-LM", Planning::detmax, Method::m_lm, {}, {}},
       {"random", "M-LM", Planning::random, Method::m_lm, {}, {}},
@@ -84,23 +86,29 @@ Study study_fig8(const StudyOptions& options) {
         {"our plan, 40 poses", 40, {}, 1, false},
         {"our plan, 40 poses, two payloads, long tool", 40, {payload, 5 * payload}, 3, true},
     };
+    options.say(arm.name + ": planning", 0);
     std::map<Planning, std::vector<StudiedPose>> planned;
-    double done = 0;
-    const double all = static_cast<double>(4 + variations.size());
-    for (const Case& c : cases) {
-      if (planned.count(c.planning) != 0) continue;
-      options.say(arm.name + ": " + c.poses, done++ / all);
-      planned[c.planning] = planned_poses(arm, 14, c.planning, options.seed);
-    }
+    for (const Case& c : cases) planned[c.planning];
     std::vector<std::pair<StudiedArm, std::vector<StudiedPose>>> varied;
     for (const Variation& v : variations) {
-      options.say(fmt::format("{}: {}", arm.name, v.name), done++ / all);
       StudiedArm changed = arm;
       for (double& x : changed.robot.nominal.tool_xyz_m) x *= v.tool_length;
       for (double& x : changed.robot.nominal.payload_com_m) x *= v.tool_length;
-      varied.emplace_back(changed,
-                          planned_poses(changed, v.poses, Planning::ours, options.seed, v.payloads_kg));
+      varied.emplace_back(changed, std::vector<StudiedPose>());
     }
+    std::vector<std::function<void()>> plans;
+    for (auto& [planning, poses] : planned) {
+      plans.emplace_back(
+          [&, how = planning, to = &poses] { *to = planned_poses(arm, 14, how, options.seed); });
+    }
+    for (std::size_t v = 0; v < variations.size(); ++v) {
+      plans.emplace_back([&, v] {
+        varied[v].second = planned_poses(varied[v].first, variations[v].poses, Planning::ours, options.seed,
+                                         variations[v].payloads_kg);
+      });
+    }
+    for_each_repeat(plans.size(), [&](std::size_t k) { plans[k](); });
+    options.say(arm.name + ": calibrating", 0.5);
     Curves curves;
     curves.described = "Score by method and noise, " + arm.name;
     curves.x_name = "row of the table";
@@ -116,6 +124,19 @@ Study study_fig8(const StudyOptions& options) {
         study.rows.push_back(row_of(arm, noise, c.poses, c.estimator, experiment,
                                     repeated_score(experiment, options.repeats, options.seed), true));
         if (arm.name == "TX60L") study.rows.back().paper = n1 ? c.paper_n1 : c.paper_n2;
+      }
+      {
+        ExperimentOptions how;
+        const Experiment experiment(arm, planned.at(Planning::sapso), how);
+        const Eigen::VectorXd errors = errors_at_the_chosen_draw(arm, planned.at(Planning::sapso),
+                                                                 options.seed, experiment.parameters()) *
+                                       (noise.position_sigma_m / noise_n1.position_sigma_m);
+        StudyRow row;
+        row.labels = {arm.name, noise.name, "SAPSO (paper's proposal)",
+                      "least squares, on the noise it was chosen with"};
+        row.ours = (1 - errors.array().abs() / experiment.truth().array().abs()).max(0.0).mean();
+        row.remark = "one draw: no estimate of anything, see below";
+        study.rows.push_back(row);
       }
       for (std::size_t v = 0; v < variations.size(); ++v) {
         ExperimentOptions how;
@@ -150,6 +171,13 @@ Study study_fig8(const StudyOptions& options) {
       "SAPSO with M-LM and with least squares, and DETMAX with both, say where a difference comes from: from "
       "the poses. "
       "M-LM and one linear step differ by the curvature of the model only.");
+  study.notes.push_back(
+      "Eq. 30 needs the true parameters and the identified ones, hence noise: with one draw of it the swarm "
+      "finds poses that "
+      "suit this draw. Judged on the same draw they score far above the limit, on fresh noise not even like "
+      "random poses. "
+      "That alone would explain a figure above the limit. In expectation (tr(M^-1)) the same swarm plans for "
+      "all noise.");
   study.notes.push_back(
       "All poses are within limits, clear of the arm and seen by a tracker 2.5 m before it. Tolerances as "
       "priors are 0.1 "

@@ -3,6 +3,9 @@
 #ifndef FLEXCOMP_HOST_STUDIES_PAPER_HPP
 #define FLEXCOMP_HOST_STUDIES_PAPER_HPP
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,6 +13,12 @@
 #include "files/robot_file.hpp"
 
 namespace flexcomp::host {
+
+/// Where to measure.
+struct StudiedPose {
+  std::array<double, joint_count> q_rad{};
+  double payload_kg = 0;
+};
 
 /// An arm whose errors are known because they are assumed.
 struct StudiedArm {
@@ -27,10 +36,14 @@ StudiedArm paper_tx60l();
 StudiedArm paper_rx160l();
 
 /// The same arm with everything but its compliances scaled until the mean position error of the nominal arm is this.
-StudiedArm scaled_to(const StudiedArm& arm, double mean_error_m);
+StudiedArm scaled_to(const StudiedArm& arm, double mean_error_m, const std::vector<StudiedPose>& poses);
 
-/// Mean position error at the origin of Ftool of the nominal arm, over 4,000 random poses within the limits.
-double mean_error_before_m(const StudiedArm& arm);
+/// Mean position error at the origin of Ftool of the nominal arm.
+double mean_error_before_m(const StudiedArm& arm, const std::vector<StudiedPose>& poses);
+
+/// Random poses within the limits, payloads in turn (none given: the robot's).
+std::vector<StudiedPose> random_poses(const StudiedArm& arm, std::size_t count, std::uint64_t seed,
+                                      const std::vector<double>& payloads_kg = {});
 
 enum class ErrorKind { joint_angles, link_lengths };
 /// Only the Δθ, or only the Δd, of Table 1, `factor` times their size.

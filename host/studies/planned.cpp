@@ -1,6 +1,7 @@
 #include "studies/planned.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -29,26 +30,28 @@ class OracleObjective {
   double operator()(const PoseSet& set) const {
     const std::vector<Block> blocks = problem_.blocks(set);
     const Information information = problem_.of(blocks);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(information.unknowns());
-    for (std::size_t k = 0; k < blocks.size(); ++k)
-      right += blocks[k] * noise_.col(static_cast<Eigen::Index>(k));
-    const double omin = (information.inverse() * right).squaredNorm();
-    return omin / problem_.criterion().o1(information.figures());
+    return errors(blocks, information).squaredNorm() / problem_.criterion().o1(information.figures());
+  }
+
+  /// Estimate minus truth in units.
+  Eigen::VectorXd errors(const PoseSet& set) const {
+    const std::vector<Block> blocks = problem_.blocks(set);
+    return errors(blocks, problem_.of(blocks));
   }
 
  private:
+  Eigen::VectorXd errors(const std::vector<Block>& blocks, const Information& information) const {
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(information.unknowns());
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+      right += blocks[k] * noise_.col(static_cast<Eigen::Index>(k));
+    return information.inverse() * right;
+  }
+
   const PlanProblem& problem_;
   Eigen::MatrixXd noise_;
 };
 
-}  // namespace
-
-std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count, Planning how,
-                                       std::uint64_t seed, const std::vector<double>& payloads_kg) {
-  Cell cell;
-  cell.tracker_m = Eigen::Vector3d(2.5, 0, 0.3);
-  const Feasibility feasibility(arm.robot, cell);
-
+PlanProblem problem_of(const StudiedArm& arm, std::size_t count, const std::vector<double>& payloads_kg) {
   PlanProblem problem;
   problem.instrument = Instrument::pose(arm.robot.position_sigma_m, arm.robot.orientation_sigma_rad);
   for (const double payload :
@@ -60,8 +63,37 @@ std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count,
   for (const PoseContext& context : problem.payloads) like.push_back({{}, context, problem.instrument});
   problem.information = std::make_shared<PoseInformation>(arm.robot, ModelKind::full, false, like);
   problem.limits = arm.robot.nominal.limits;
-  problem.feasible = [&](const Joints& q) { return feasibility.allows(q); };
   problem.poses = count;
+  return problem;
+}
+
+}  // namespace
+
+Eigen::VectorXd errors_at_the_chosen_draw(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
+                                          std::uint64_t seed, const std::vector<Parameter>& parameters) {
+  const PlanProblem problem = problem_of(arm, poses.size(), {});
+  PoseSet set;
+  for (const StudiedPose& pose : poses) set.push_back({pose.q_rad, 0});
+  const Eigen::VectorXd in_units = OracleObjective(problem, seed).errors(set);
+  const std::vector<std::string>& names = problem.information->names();
+  Eigen::VectorXd errors(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    const auto at =
+        static_cast<std::size_t>(std::find(names.begin(), names.end(), parameters[p].name) - names.begin());
+    errors[static_cast<Eigen::Index>(p)] = in_units[static_cast<Eigen::Index>(at)] *
+                                           problem.information->file_units()[at] *
+                                           parameters[p].si_per_file_unit();
+  }
+  return errors;
+}
+
+std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count, Planning how,
+                                       std::uint64_t seed, const std::vector<double>& payloads_kg) {
+  Cell cell;
+  cell.tracker_m = Eigen::Vector3d(2.5, 0, 0.3);
+  const Feasibility feasibility(arm.robot, cell);
+  PlanProblem problem = problem_of(arm, count, payloads_kg);
+  problem.feasible = [&](const Joints& q) { return feasibility.allows(q); };
 
   std::unique_ptr<Search> search;
   switch (how) {
@@ -73,10 +105,11 @@ std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count,
       search = std::make_unique<DetmaxSearch>(problem, options);
       break;
     }
-    case Planning::sapso: {
+    case Planning::sapso:
+    case Planning::sapso_expected: {
       SapsoOptions options;
       options.seed = seed;
-      options.objective = OracleObjective(problem, seed);
+      if (how == Planning::sapso) options.objective = OracleObjective(problem, seed);
       search = std::make_unique<SapsoSearch>(problem, options);
       break;
     }
