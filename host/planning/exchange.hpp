@@ -15,8 +15,9 @@ namespace flexcomp::host {
 struct CandidatePool {
   PoseSet poses;
   Eigen::MatrixXd blocks;
-  Eigen::Index rows = 6;   ///< numbers measured per pose
-  bool may_repeat = true;  ///< one candidate may be chosen several times
+  Eigen::MatrixXd squares;  ///< HHᵀ of each as a column, one triangle; none where there are very many
+  Eigen::Index rows = 6;    ///< numbers measured per pose
+  bool may_repeat = true;   ///< one candidate may be chosen several times
 
   std::size_t size() const { return poses.size(); }
   Block block(std::size_t k) const { return blocks.middleCols(static_cast<Eigen::Index>(k) * rows, rows); }
