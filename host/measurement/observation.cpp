@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 
 #include "files/input_error.hpp"
 #include "measurement/reflectors.hpp"
@@ -42,24 +43,59 @@ Points choose_template(const DataFile& data, const RobotFile& robot, const std::
   return shape;
 }
 
-void warn(const DataFile& data, const RobotFile& robot, const std::vector<std::string>& slipped,
-          std::vector<std::string>& warnings) {
+/// "reflector A", or all that it may have been with their probabilities.
+std::string moved(const Suspicion& suspicion) {
+  if (suspicion.several) return "more than one reflector";
+  if (suspicion.named.size() == 1) return fmt::format("reflector {}", "ABCD"[suspicion.named[0]]);
+  std::string text = "one of the reflectors";
+  for (std::size_t i = 0; i < suspicion.named.size(); ++i) {
+    const std::size_t k = suspicion.named[i];
+    text += fmt::format("{} {} ({:.0f} %)", i == 0 ? "" : (i + 1 == suspicion.named.size() ? " or" : ","),
+                        "ABCD"[k], 100 * suspicion.probability[k]);
+  }
+  return text;
+}
+
+/// Names what slipped in these rows (indices, ascending). Rows that follow each other with the same shape show one slip.
+void warn(const DataFile& data, const RobotFile& robot, const std::vector<Points>& rows, const Points& shape,
+          const std::vector<std::size_t>& slipped, std::vector<std::string>& warnings) {
   if (2 * slipped.size() > data.rows.size() && !robot.reflectors_m.empty()) {
     warnings.push_back(fmt::format(
         "{}: in {} of {} rows the distances between the reflectors are not those of {} (tool.reflectors_mm): "
-        "either the "
-        "template or sigma_mm is wrong; without reflectors_mm the template is estimated from the data.",
+        "either the template or sigma_mm is wrong; without reflectors_mm the template is estimated from the "
+        "data.",
         data.path, slipped.size(), data.rows.size(), robot.path));
     return;
   }
-  warnings.insert(warnings.end(), slipped.begin(), slipped.end());
+  for (std::size_t i = 0; i < slipped.size();) {
+    const double sigma = data.rows[slipped[i]].position_sigma_m;
+    std::vector<Points> together{rows[slipped[i]]};
+    std::size_t next = i + 1;
+    for (; next < slipped.size() && slipped[next] == slipped[next - 1] + 1; ++next) {
+      if (data.rows[slipped[next]].position_sigma_m != sigma) break;
+      together.push_back(rows[slipped[next]]);
+      if (same_shape(together, sigma)) continue;
+      together.pop_back();
+      break;
+    }
+    const Points mean = estimate_template(together);
+    const std::string lines = together.size() == 1 ? fmt::format("{}", data.rows[slipped[i]].line)
+                                                   : fmt::format("{}-{}", data.rows[slipped[i]].line,
+                                                                 data.rows[slipped[next - 1]].line);
+    warnings.push_back(fmt::format(
+        "{}:{}: {} has moved or is badly seated: the distances to the others are off (misfit {:.3f} mm "
+        "rms).",
+        data.path, lines, moved(suspect_reflectors(together, shape, sigma)),
+        1e3 * std::sqrt(fit_rigid(mean, shape).squares_m2 / static_cast<double>(data.reflectors))));
+    i = next;
+  }
 }
 
 void observe_reflectors(const DataFile& data, const RobotFile& robot, std::vector<Observation>& observations,
                         std::vector<std::string>* warnings) {
   const std::vector<Points> rows = reflector_rows(data);
   const Points shape = choose_template(data, robot, rows);
-  std::vector<std::string> slipped;
+  std::vector<std::size_t> slipped;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const Measurement& m = data.rows[k];
     Observation& o = observations[k];
@@ -71,15 +107,9 @@ void observe_reflectors(const DataFile& data, const RobotFile& robot, std::vecto
     o.whitening = information.llt().matrixU();
     o.misfit_chi2 = fit.squares_m2 / (m.position_sigma_m * m.position_sigma_m);
     o.misfit_dof = 3 * data.reflectors - 6;
-    if (misfit_probability(o.misfit_chi2, o.misfit_dof) < improbable) {
-      slipped.push_back(
-          fmt::format("{}:{}: reflector {} has moved or is badly seated: the distances to the others are off "
-                      "(misfit {:.3f} mm rms).",
-                      data.path, m.line, "ABCD"[suspect_reflector(rows[k], shape)],
-                      1e3 * std::sqrt(fit.squares_m2 / static_cast<double>(data.reflectors))));
-    }
+    if (misfit_probability(o.misfit_chi2, o.misfit_dof) < improbable) slipped.push_back(k);
   }
-  if (warnings != nullptr) warn(data, robot, slipped, *warnings);
+  if (warnings != nullptr) warn(data, robot, rows, shape, slipped, *warnings);
 }
 
 }  // namespace

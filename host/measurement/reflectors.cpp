@@ -1,8 +1,13 @@
 #include "measurement/reflectors.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 namespace flexcomp::host {
 
@@ -24,14 +29,79 @@ Pose<double> inverse(const Pose<double>& pose) {
   return {pose.rotation.transpose(), -(pose.rotation.transpose() * pose.position)};
 }
 
+double chi2_above(double chi2, double degrees_of_freedom) {
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), chi2));
+}
+
+/// All points but one.
+struct Others {
+  Points points;
+  Eigen::Vector3d left_out;
+};
+
+Others apart(std::span<const Eigen::Vector3d> points, std::size_t leave) {
+  Others out{{}, points[leave]};
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (k != leave) out.points.push_back(points[k]);
+  }
+  return out;
+}
+
+/// Place of the left-out point along the line of the two others, from their middle, and off it.
+Eigen::Vector2d seen_from_line(const Others& o) {
+  const Eigen::Vector3d along = (o.points[1] - o.points[0]).normalized();
+  const Eigen::Vector3d from_middle = o.left_out - (o.points[0] + o.points[1]) / 2;
+  return {along.dot(from_middle), along.cross(from_middle).norm()};
+}
+
+/// Logarithm of how much a move of this point deforms the shape, per direction in which it does: what is left of the
+/// move when the best rigid motion is taken away.
+double log_visibility(std::span<const Eigen::Vector3d> points, std::size_t moved) {
+  const auto rows = static_cast<Eigen::Index>(3 * points.size());
+  const Eigen::Vector3d middle = centroid(points);
+  double size = 0;
+  for (const Eigen::Vector3d& p : points) size = std::max(size, (p - middle).norm());
+  Eigen::MatrixXd rigid(rows, 6);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Eigen::Vector3d r = (points[k] - middle) / size;
+    auto block = rigid.middleRows<3>(static_cast<Eigen::Index>(3 * k));
+    block.leftCols<3>().setIdentity();
+    block.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
+  }
+  const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(rigid).householderQ();
+  const Eigen::MatrixXd deformation =
+      q.rightCols(rows - 6).transpose().middleCols(static_cast<Eigen::Index>(3 * moved), 3);
+  double sum = 0;
+  const Eigen::VectorXd seen = Eigen::JacobiSVD<Eigen::MatrixXd>(deformation).singularValues();
+  for (const double s : seen) {
+    if (s > 1e-6) sum += std::log(s);
+  }
+  return sum;
+}
+
 }  // namespace
 
 RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m) {
-  const Eigen::Vector3d from = centroid(template_m);
-  const Eigen::Vector3d to = centroid(measured_m);
+  return fit_rigid(measured_m, template_m, std::vector<double>(template_m.size(), 1));
+}
+
+RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const Eigen::Vector3d> template_m,
+                   std::span<const double> sigma_m) {
+  double total = 0;
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+  std::vector<double> weight;
+  for (std::size_t k = 0; k < template_m.size(); ++k) {
+    weight.push_back(1 / (sigma_m[k] * sigma_m[k]));
+    from += weight[k] * template_m[k];
+    to += weight[k] * measured_m[k];
+    total += weight[k];
+  }
+  from /= total;
+  to /= total;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < template_m.size(); ++k) {
-    covariance += (measured_m[k] - to) * (template_m[k] - from).transpose();
+    covariance += weight[k] * (measured_m[k] - to) * (template_m[k] - from).transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   // Three or four points in a plane leave the third direction open: the determinant says which way it must point.
@@ -89,16 +159,22 @@ bool on_one_line(std::span<const Eigen::Vector3d> points_m) {
 
 Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
                                             std::span<const Eigen::Vector3d> template_m, double sigma_m) {
+  return fit_information(pose, template_m, std::vector<double>(template_m.size(), sigma_m));
+}
+
+Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
+                                            std::span<const Eigen::Vector3d> template_m,
+                                            std::span<const double> sigma_m) {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-  for (const Eigen::Vector3d& t : template_m) {
-    const Eigen::Vector3d r = pose.rotation * t;
+  for (std::size_t k = 0; k < template_m.size(); ++k) {
+    const Eigen::Vector3d r = pose.rotation * template_m[k];
     // A point moves by dp + phi x r.
     Eigen::Matrix<double, 3, 6> j;
     j.leftCols<3>().setIdentity();
     j.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
-    information += j.transpose() * j;
+    information += j.transpose() * j / (sigma_m[k] * sigma_m[k]);
   }
-  return information / (sigma_m * sigma_m);
+  return information;
 }
 
 double misfit_probability(double chi2, std::size_t dof) {
@@ -108,27 +184,53 @@ double misfit_probability(double chi2, std::size_t dof) {
   return std::erfc(std::sqrt(half)) + std::sqrt(half / std::acos(-1.0)) * 2 * std::exp(-half);
 }
 
-std::size_t suspect_reflector(std::span<const Eigen::Vector3d> measured_m,
-                              std::span<const Eigen::Vector3d> template_m) {
+Suspicion suspect_reflectors(const std::vector<Points>& rows_m, std::span<const Eigen::Vector3d> template_m,
+                             double sigma_m) {
   const std::size_t n = template_m.size();
-  std::size_t suspect = 0;
-  double least = -1;
-  for (std::size_t leave = 0; leave < n; ++leave) {
-    // Distances among the others: those that do not involve the one that moved are unchanged.
-    double change = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < n; ++j) {
-        if (i == leave || j == leave) continue;
-        const double d = (measured_m[i] - measured_m[j]).norm() - (template_m[i] - template_m[j]).norm();
-        change += d * d;
-      }
-    }
-    if (least < 0 || change < least) {
-      least = change;
-      suspect = leave;
-    }
+  const Points shape = estimate_template(rows_m);
+  const double sigma = sigma_m / std::sqrt(static_cast<double>(rows_m.size()));
+  // What a single one would have had to do, and what then remains to be noise.
+  std::vector<double> log_weight(n);
+  double least_chi2 = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Others measured = apart(shape, k);
+    const Others drawn = apart(template_m, k);
+    const RigidFit fit = fit_rigid(measured.points, drawn.points);
+    const double chi2 = fit.squares_m2 / (sigma * sigma);
+    // Two others leave a turn about their line open: only along and off that line can a move be seen.
+    const double move =
+        n == 3 ? (seen_from_line(measured) - seen_from_line(drawn)).norm()
+               : (measured.left_out - fit.pose.rotation * drawn.left_out - fit.pose.position).norm();
+    const double directions = n == 3 ? 2 : 3;
+    log_weight[k] = -chi2 / 2 - directions * std::log(std::max(move, sigma)) - log_visibility(template_m, k);
+    least_chi2 = std::min(least_chi2, chi2);
   }
-  return suspect;
+  Suspicion out;
+  out.several = chi2_above(least_chi2, n == 3 ? 1 : 3) < 1e-6;
+  const double largest = *std::max_element(log_weight.begin(), log_weight.end());
+  double sum = 0;
+  for (const double w : log_weight) sum += std::exp(w - largest);
+  for (const double w : log_weight) out.probability.push_back(std::exp(w - largest) / sum);
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t i, std::size_t j) { return out.probability[i] > out.probability[j]; });
+  double held = 0;
+  for (const std::size_t k : order) {
+    if (held >= 0.99) break;
+    held += out.probability[k];
+    out.named.push_back(k);
+  }
+  return out;
+}
+
+bool same_shape(const std::vector<Points>& rows_m, double sigma_m) {
+  if (rows_m.size() < 2) return true;
+  const Points mean = estimate_template(rows_m);
+  double squares = 0;
+  for (const Points& row : rows_m) squares += fit_rigid(row, mean).squares_m2;
+  const double dof = static_cast<double>((rows_m.size() - 1) * (3 * mean.size() - 6));
+  return chi2_above(squares / (sigma_m * sigma_m), dof) > 1e-4;
 }
 
 }  // namespace flexcomp::host

@@ -40,7 +40,7 @@ std::string name_of(Obstruction obstruction);
 ///   r_i + s * r_s from every body's axis. Arms of the tool do not block beams.
 /// - *Tool*: reflectors, and arms from the origin of Ftool to each of them, keep more than r_i + s * r_s from every body.
 ///   A tool without reflectors is its tool point, which is then what the tracker sees. Bodies on frame 6 move with the
-///   tool and are tested against beams only.
+///   tool and are not tested against it; what else is bolted to the flange, a tool's stem or a gripper, can be one.
 /// - *Mounted near*: where no pose at all lets a reflector (or an arm) keep s from a body of the arm, because the tool is
 ///   bolted on beside it, that pair - and this reflector's beam at that body - has to keep 1 instead of s, the ball
 ///   itself; if no pose allows that either, 0: not inside the body; and where even this is never so, it is not tested. A

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "files/robot_file.hpp"
@@ -114,6 +116,138 @@ TEST(Reflectors, NamesTheReflectorThatMoved) {
       }
     }
   }
+}
+
+/// What suspect_reflectors() says of simulated slips of one reflector.
+struct Verdicts {
+  int slips = 0;
+  int single = 0;        ///< one reflector was named
+  int single_wrong = 0;  ///< and it was not the one
+  int missing = 0;       ///< the one that moved is not among the named
+  int several = 0;       ///< more than one was blamed
+  double expected = 0;   ///< sum of the probabilities of the first named …
+  int first_right = 0;   ///< … and how often it was the one
+};
+
+Verdicts slips(const Points& shape, std::size_t rows, std::uint64_t seed) {
+  constexpr double sigma = 35e-6;
+  Noise noise(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> size(std::log(0.1e-3), std::log(10e-3));
+  Verdicts v;
+  while (v.slips < 3000) {
+    const std::size_t moved = random() % shape.size();
+    Points slipped = shape;
+    slipped[moved] += std::exp(size(random)) * noise.vector().normalized();
+    std::vector<Points> measured;
+    double chi2 = 0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      const Pose<double> pose = noise.pose();
+      Points row;
+      for (const Eigen::Vector3d& p : slipped)
+        row.push_back(pose.rotation * p + pose.position + sigma * noise.vector());
+      chi2 = fit_rigid(row, shape).squares_m2 / (sigma * sigma);
+      measured.push_back(row);
+    }
+    // As observe() asks it: only what cannot be noise is called a slip.
+    if (misfit_probability(chi2, 3 * shape.size() - 6) > 1e-6) continue;
+    const Suspicion s = suspect_reflectors(measured, shape, sigma);
+    ++v.slips;
+    v.several += s.several ? 1 : 0;
+    v.single += s.named.size() == 1 ? 1 : 0;
+    v.single_wrong += s.named.size() == 1 && s.named[0] != moved ? 1 : 0;
+    v.missing += std::find(s.named.begin(), s.named.end(), moved) == s.named.end() ? 1 : 0;
+    v.expected += s.probability[s.named[0]];
+    v.first_right += s.named[0] == moved ? 1 : 0;
+    EXPECT_NEAR(std::accumulate(s.probability.begin(), s.probability.end(), 0.0), 1, 1e-12);
+  }
+  return v;
+}
+
+TEST(Reflectors, ASlipIsBlamedOnTheRightOneOrHonestlyOnSeveral) {
+  Points cross = tx60l().reflectors_m;
+  const Points three(cross.begin(), cross.begin() + 3);
+  const Points uneven{{0, -0.11, 0.02}, {-0.06, 0, 0}, {0.01, 0.07, -0.03}};
+  Points lifted = cross;  // no longer in one plane
+  lifted[3].z() += 0.04;
+  struct Case {
+    const char* name;
+    Points shape;
+    int least_single;  // of 3000
+  };
+  const std::vector<Case> cases{{"three", three, 1500},
+                                {"three, uneven", uneven, 1500},
+                                {"cross of four", cross, 1500},
+                                {"four, lifted", lifted, 2400}};
+  for (const Case& c : cases) {
+    int before = 0;
+    for (const std::size_t rows : {1U, 10U}) {
+      const Verdicts v = slips(c.shape, rows, 17);
+      std::printf(
+          "%-14s %2zu rows: named alone %.1f %%, wrongly %.2f %%; not among the named %.2f %%; "
+          "first right %.1f %% (said %.1f %%); several %.2f %%\n",
+          c.name, rows, v.single / 30.0, v.single_wrong / 30.0, v.missing / 30.0, v.first_right / 30.0,
+          v.expected / 30.0, v.several / 30.0);
+      EXPECT_GT(v.single, c.least_single) << c.name;
+      EXPECT_LE(v.single_wrong, 30) << c.name;  // 1 %
+      EXPECT_LE(v.missing, 30) << c.name;
+      EXPECT_LE(v.several, 3) << c.name;
+      // The probabilities are what they say; 3 % is four standard errors.
+      EXPECT_NEAR(v.first_right, v.expected, 90) << c.name;
+      EXPECT_GT(v.single, before) << c.name << ": ten rows must tell more than one";
+      before = v.single;
+    }
+  }
+}
+
+TEST(Reflectors, AChangeOfOneDistanceMayBeEitherEnd) {
+  // C moves on a circle about A: only BC changes.
+  Points shape(tx60l().reflectors_m.begin(), tx60l().reflectors_m.begin() + 3);
+  Points slipped = shape;
+  slipped[2] = shape[0] + Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitZ()) * (shape[2] - shape[0]);
+  const Suspicion s = suspect_reflectors({slipped}, shape, 35e-6);
+  EXPECT_THAT(s.named, testing::UnorderedElementsAre(1U, 2U));
+  EXPECT_LT(s.probability[0], 1e-6);
+  EXPECT_GT(s.probability[1], 0.1);
+  EXPECT_GT(s.probability[2], 0.1);
+  // The same from the data: one warning for the whole run of rows, with both letters.
+  Measured m = measure(30, 3, 35e-6, 9);
+  for (std::size_t k = 12; k < 18; ++k)
+    m.data.rows[k].reflector_m[2] = m.truth[k].rotation * slipped[2] + m.truth[k].position;
+  std::vector<std::string> warnings;
+  observe(m.data, tx60l(), &warnings);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings[0],
+              testing::AllOf(HasSubstr("data.csv:14-19: one of the reflectors"), HasSubstr(" B ("),
+                             HasSubstr(" C ("), HasSubstr(" or "), Not(HasSubstr(" A ("))));
+}
+
+TEST(Reflectors, AReflectorThatLeavesThePlaneOfFourMayBeAnyOfThem) {
+  Points slipped = tx60l().reflectors_m;
+  slipped[1].z() += 0.5e-3;
+  EXPECT_EQ(suspect_reflectors({slipped}, tx60l().reflectors_m, 35e-6).named.size(), 4U);
+}
+
+TEST(Reflectors, TwoThatMovedAreNotBlamedOnOne) {
+  Points slipped = tx60l().reflectors_m;
+  slipped[0] += Eigen::Vector3d(0.5e-3, 1e-3, 0);
+  slipped[1] += Eigen::Vector3d(-0.8e-3, 0.3e-3, 0);
+  EXPECT_TRUE(suspect_reflectors({slipped}, tx60l().reflectors_m, 35e-6).several);
+  slipped[1] = tx60l().reflectors_m[1];
+  EXPECT_FALSE(suspect_reflectors({slipped}, tx60l().reflectors_m, 35e-6).several);
+}
+
+TEST(Reflectors, AnotherSlipOrARowBetweenIsAnotherWarning) {
+  Measured m = measure(40, 4, 35e-6, 10);
+  for (const std::size_t k : {10U, 11U, 12U})
+    m.data.rows[k].reflector_m[0] += m.truth[k].rotation * Eigen::Vector3d(0, -1e-3, 0);
+  for (const std::size_t k : {13U, 14U, 20U})
+    m.data.rows[k].reflector_m[1] += m.truth[k].rotation * Eigen::Vector3d(-1e-3, 0.2e-3, 0);
+  std::vector<std::string> warnings;
+  observe(m.data, tx60l(), &warnings);
+  EXPECT_THAT(warnings,
+              ElementsAre(HasSubstr("data.csv:12-14: reflector A "),
+                          HasSubstr("data.csv:15-16: reflector B "), HasSubstr("data.csv:22: reflector B ")));
 }
 
 TEST(Reflectors, AWrongTemplateIsSaidOnce) {

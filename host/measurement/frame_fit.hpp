@@ -1,0 +1,34 @@
+/// \file
+/// Where a tracker stands: its frame in the constructed base frame Fb, from points that are known in both.
+#ifndef FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
+#define FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "flexcomp/linear.hpp"
+
+namespace flexcomp::host {
+
+struct FrameFit {
+  Pose<double> pose;  ///< maps the tracker's frame to Fb; its position is the tracker, in Fb
+  /// Of [position, m; rotation vector log(R R_trueᵀ), rad], both in Fb. Far from the points the position is known the worse
+  /// and goes with the rotation.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::vector<Eigen::Vector3d> residual_m;  ///< per point, nominal minus fitted, in Fb
+  double chi2 = 0;                          ///< their squares in units of sigma
+  double dof = 0;                           ///< of chi2: 3 n - 6
+};
+
+/// Weighted least squares over all points. `sigma_m`: standard deviation of each point per coordinate, of measurement and
+/// nominal place together. `source` is named in messages.
+/// \throws InputError  fewer than three points; not as many nominal points and sigmas; a sigma that is not positive; all
+///                     points on one line within a thousandth of its length
+FrameFit fit_frame(std::span<const Eigen::Vector3d> tracker_m, std::span<const Eigen::Vector3d> nominal_m,
+                   std::span<const double> sigma_m, const std::string& source);
+
+}  // namespace flexcomp::host
+
+#endif

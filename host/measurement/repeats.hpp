@@ -1,0 +1,50 @@
+/// \file
+/// Repeated poses: what the instrument and the arm's own repeatability scatter, whatever the model, and whether the model
+/// misses more than that.
+#ifndef FLEXCOMP_HOST_MEASUREMENT_REPEATS_HPP
+#define FLEXCOMP_HOST_MEASUREMENT_REPEATS_HPP
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+
+/// 95 % interval.
+struct Interval {
+  double low = 0;
+  double high = 0;
+};
+
+/// Pooled over all groups of repeats, each about its own mean.
+struct PureError {
+  std::size_t groups = 0;
+  std::size_t rows = 0;              ///< in these groups
+  double sigma_position_m = 0;       ///< standard deviation per axis
+  Interval position_interval_m;      ///< of sigma_position_m
+  double sigma_orientation_rad = 0;  ///< per axis of the rotation vector; 0 where no orientation was measured
+  Interval orientation_interval_rad;  ///< of sigma_orientation_rad
+  Matrix6d covariance =
+      Matrix6d::Zero();  ///< of [position, m; rotation vector, rad] in the measurement frame
+  double dof = 0;        ///< numbers measured in the groups, less one mean for each group
+  double chi2_per_dof_whitened =
+      0;  ///< the square of the scatter in units of the declared noise; 1 is as declared
+  /// Lack of fit against the scatter, where the fit leaves degrees of freedom beyond those of the repeats: its F, and the
+  /// probability that a complete model has a larger one.
+  std::optional<double> lack_of_fit_f;
+  std::optional<double> lack_of_fit_p;
+};
+
+/// Rows that repeat each other: joint readings within 1e-9 rad and the same context, time and temperature included (what
+/// drifts in between is no pure error). Indices, in groups of two or more, in the order of the rows.
+std::vector<std::vector<std::size_t>> repeats(const std::vector<Observation>& rows);
+
+/// `fit_chi2` and `fit_dof`: sum of squared whitened residuals and degrees of freedom of a least-squares fit of these rows
+/// (all in full: outliers that a robust fit weighs down must be left out of both). Nothing where no row is repeated.
+std::optional<PureError> pure_error(const std::vector<Observation>& rows, double fit_chi2, double fit_dof);
+
+}  // namespace flexcomp::host
+
+#endif
