@@ -69,15 +69,20 @@ std::vector<std::size_t> random_choice(const CandidatePool& pool, std::size_t co
 }
 
 PoseSet poses_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen) {
-  PoseSet set;
-  for (const std::size_t c : chosen) set.push_back(pool.poses[c]);
+  PoseSet set(chosen.size());
+  for (std::size_t k = 0; k < chosen.size(); ++k) set[k] = pool.poses[chosen[k]];
   return set;
+}
+
+std::vector<Block> blocks_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen) {
+  std::vector<Block> blocks(chosen.size());
+  for (std::size_t k = 0; k < chosen.size(); ++k) blocks[k] = pool.block(chosen[k]);
+  return blocks;
 }
 
 double exchange(const PlanProblem& problem, const CandidatePool& pool, const Criterion& criterion,
                 std::vector<std::size_t>& chosen, std::uint64_t& evaluations, int most_rounds) {
-  std::vector<Block> blocks;
-  for (const std::size_t c : chosen) blocks.push_back(pool.block(c));
+  std::vector<Block> blocks = blocks_of(pool, chosen);
   Information now = problem.of(blocks);
   double score = criterion.log_score(now.figures());
   std::vector<char> taken(pool.size(), 0);

@@ -35,6 +35,7 @@ double exchange(const PlanProblem& problem, const CandidatePool& pool, const Cri
                 std::vector<std::size_t>& chosen, std::uint64_t& evaluations, int most_rounds = 1000);
 
 PoseSet poses_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen);
+std::vector<Block> blocks_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen);
 
 struct ExchangeOptions {
   std::size_t candidates = 5000;  ///< where the problem brings none
