@@ -523,15 +523,6 @@ void Plan::run() {
   for (std::size_t k = 0; k < std::min<std::size_t>(5, worst.size()); ++k) {
     common.say(fmt::format("    {:<40} {:.3g}", worst[k].name, worst[k].value));
   }
-  if (!worst.empty() && worst.front().units > 30) {
-    const std::string text = fmt::format(
-        "{} would be known so badly (3 mm or 1.5 deg, or as much in its unit) that identify would leave it "
-        "out: more "
-        "poses, a heavier payload or another tool are needed",
-        worst.front().name);
-    common.warn({text});
-    warnings_.push_back(text);
-  }
   common.say(fmt::format("  {} evaluations, {:.2f} s", search->evaluations(), seconds));
   if (stopped_) {
     common.say(fmt::format("stopped: the best plan so far was written{}",

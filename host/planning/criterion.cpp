@@ -15,6 +15,13 @@ double log_det_of(const Eigen::LLT<Eigen::MatrixXd>& llt) {
   return 2 * llt.matrixLLT().diagonal().array().log().sum();
 }
 
+/// Where a pose takes nearly all that is known of some direction with it, or brings it, the inverse changes by orders of
+/// magnitude and an update keeps few digits: then from scratch.
+bool loses_digits(const Eigen::LLT<Eigen::MatrixXd>& llt) {
+  const auto diagonal = llt.matrixLLT().diagonal();
+  return llt.info() != Eigen::Success || diagonal.minCoeff() < 1e-2 || diagonal.maxCoeff() > 1e2;
+}
+
 /// log det of G = 1 + a, and tr(G⁻¹ s), for symmetric a and s.
 template <int R>
 void small_solve(const Eigen::Matrix<double, R, R>& g, const Eigen::Matrix<double, R, R>& s, double& log_det,
@@ -101,8 +108,7 @@ void Information::update(const Block& h, double sign) {
   const Block vh = v_ * h;
   const Eigen::MatrixXd g = Eigen::MatrixXd::Identity(r, r) + sign * h.transpose() * vh;
   const Eigen::LLT<Eigen::MatrixXd> llt(g);
-  // What is left after taking a pose out must still be known, else digits are lost: then from scratch.
-  if (llt.info() != Eigen::Success || llt.matrixLLT().diagonal().minCoeff() < 1e-2) return refresh();
+  if (loses_digits(llt)) return refresh();
   v_.noalias() -= sign * vh * llt.solve(vh.transpose());
   figures_.trace = v_.diagonal().tail(parameters()).sum();
   figures_.log_det += log_det_of(llt);
@@ -112,7 +118,7 @@ void Information::update(const Block& h, double sign) {
   const Eigen::MatrixXd own_vh = v_nuisance_ * own;
   const Eigen::LLT<Eigen::MatrixXd> own_llt(Eigen::MatrixXd::Identity(r, r) +
                                             sign * own.transpose() * own_vh);
-  if (own_llt.info() != Eigen::Success || own_llt.matrixLLT().diagonal().minCoeff() < 1e-2) return refresh();
+  if (loses_digits(own_llt)) return refresh();
   v_nuisance_.noalias() -= sign * own_vh * own_llt.solve(own_vh.transpose());
   figures_.log_det -= log_det_of(own_llt);
 }

@@ -60,9 +60,7 @@ double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector
   const std::size_t n = chosen.size();
   std::vector<Figures> figures;
   Failures failures;
-  std::vector<Block> blocks;
-  for (const std::size_t c : chosen) blocks.push_back(pool.block(c));
-  Excursion best{chosen, problem.of(blocks)};
+  Excursion best{chosen, problem.of(blocks_of(pool, chosen))};
   for (;;) {
     Excursion e = best;
     Failures passed;

@@ -10,6 +10,25 @@ namespace {
 /// Gains below this are rounding.
 constexpr double least_gain = 1e-10;
 
+/// A symmetric matrix as a vector, such that the dot product of packed(w) and packed_twice(m) is tr(W M).
+Eigen::VectorXd packed(const Eigen::MatrixXd& w) {
+  Eigen::VectorXd out(w.rows() * (w.rows() + 1) / 2);
+  Eigen::Index k = 0;
+  for (Eigen::Index c = 0; c < w.cols(); ++c) {
+    for (Eigen::Index r = c; r < w.rows(); ++r) out[k++] = w(r, c);
+  }
+  return out;
+}
+
+Eigen::VectorXd packed_twice(const Eigen::MatrixXd& m) {
+  Eigen::MatrixXd twice = 2 * m;
+  twice.diagonal() = m.diagonal();
+  return packed(twice);
+}
+
+/// 5 kB each.
+constexpr std::size_t most_squares = 20000;
+
 }  // namespace
 
 CandidatePool make_pool(const PlanProblem& problem, std::size_t count, std::mt19937_64& random) {
@@ -27,6 +46,14 @@ CandidatePool make_pool(const PlanProblem& problem, std::size_t count, std::mt19
     problem.block(pool.poses[k], h);
     pool.blocks.middleCols(static_cast<Eigen::Index>(k) * pool.rows, pool.rows) = h;
   }
+  if (pool.size() <= most_squares) {
+    const Eigen::Index unknowns = problem.information->unknowns();
+    pool.squares.resize(unknowns * (unknowns + 1) / 2, static_cast<Eigen::Index>(pool.size()));
+    for (std::size_t k = 0; k < pool.size(); ++k) {
+      h = pool.block(k);
+      pool.squares.col(static_cast<Eigen::Index>(k)) = packed_twice(h * h.transpose());
+    }
+  }
   return pool;
 }
 
@@ -42,48 +69,73 @@ std::vector<std::size_t> random_choice(const CandidatePool& pool, std::size_t co
 }
 
 PoseSet poses_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen) {
-  PoseSet set;
-  for (const std::size_t c : chosen) set.push_back(pool.poses[c]);
+  PoseSet set(chosen.size());
+  for (std::size_t k = 0; k < chosen.size(); ++k) set[k] = pool.poses[chosen[k]];
   return set;
+}
+
+std::vector<Block> blocks_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen) {
+  std::vector<Block> blocks(chosen.size());
+  for (std::size_t k = 0; k < chosen.size(); ++k) blocks[k] = pool.block(chosen[k]);
+  return blocks;
 }
 
 double exchange(const PlanProblem& problem, const CandidatePool& pool, const Criterion& criterion,
                 std::vector<std::size_t>& chosen, std::uint64_t& evaluations, int most_rounds) {
-  std::vector<Block> blocks;
-  for (const std::size_t c : chosen) blocks.push_back(pool.block(c));
-  Information rest = problem.of(blocks);
-  double score = criterion.log_score(rest.figures());
+  std::vector<Block> blocks = blocks_of(pool, chosen);
+  Information now = problem.of(blocks);
+  double score = criterion.log_score(now.figures());
   std::vector<char> taken(pool.size(), 0);
   if (!pool.may_repeat) {
     for (const std::size_t c : chosen) taken[c] = 1;
   }
-  std::vector<Figures> figures;
+  // The log score is convex in M: with its gradient W, a set in which M_c stands for M_k scores at least
+  // score + tr(W (M_c - M_k)). So only candidates with tr(W M_c) < tr(W M_k) can gain anything, and near the end these
+  // are few. W changes only with the set.
+  Eigen::VectorXd slope;
+  const auto take_slope = [&] {
+    const Eigen::MatrixXd w = now.gradient(criterion);
+    slope.resize(static_cast<Eigen::Index>(pool.size()));
+    if (pool.squares.cols() == slope.size()) {
+      slope.noalias() = pool.squares.transpose() * packed(w);
+    } else {
+      for (std::size_t c = 0; c < pool.size(); ++c) {
+        const auto h = pool.blocks.middleCols(static_cast<Eigen::Index>(c) * pool.rows, pool.rows);
+        slope[static_cast<Eigen::Index>(c)] = h.cwiseProduct(w * h).sum();
+      }
+    }
+    evaluations += pool.size();
+  };
+  take_slope();
   std::size_t unchanged = 0;
   for (int round = 0; round < most_rounds && unchanged < chosen.size(); ++round) {
     for (std::size_t k = 0; k < chosen.size() && unchanged < chosen.size(); ++k) {
-      rest.remove(blocks[k]);
-      rest.with_each(pool.blocks, pool.rows, figures);
-      evaluations += pool.size();
+      ++unchanged;
+      const double own = slope[static_cast<Eigen::Index>(chosen[k])];
+      Information rest = now;
+      bool removed = false;
       std::size_t best = chosen[k];
-      double least = criterion.log_score(figures[best]);
+      double least = score;
       for (std::size_t c = 0; c < pool.size(); ++c) {
-        if (taken[c] != 0) continue;
-        const double s = criterion.log_score(figures[c]);
+        if (taken[c] != 0 || !(slope[static_cast<Eigen::Index>(c)] < own)) continue;
+        if (!removed) rest.remove(blocks[k]);
+        removed = true;
+        ++evaluations;
+        const double s = criterion.log_score(rest.with(pool.block(c)));
         if (s < least) {
           least = s;
           best = c;
         }
       }
-      if (best != chosen[k] && least < criterion.log_score(figures[chosen[k]]) - least_gain) {
-        if (!pool.may_repeat) std::swap(taken[chosen[k]], taken[best]);
-        chosen[k] = best;
-        blocks[k] = pool.block(best);
-        score = least;
-        unchanged = 0;
-      } else {
-        ++unchanged;
-      }
+      if (best == chosen[k] || !(least < score - least_gain)) continue;
+      if (!pool.may_repeat) std::swap(taken[chosen[k]], taken[best]);
+      chosen[k] = best;
+      blocks[k] = pool.block(best);
       rest.add(blocks[k]);
+      now = rest;
+      score = criterion.log_score(now.figures());
+      take_slope();
+      unchanged = 0;
     }
   }
   return score;

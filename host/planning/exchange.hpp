@@ -15,8 +15,9 @@ namespace flexcomp::host {
 struct CandidatePool {
   PoseSet poses;
   Eigen::MatrixXd blocks;
-  Eigen::Index rows = 6;   ///< numbers measured per pose
-  bool may_repeat = true;  ///< one candidate may be chosen several times
+  Eigen::MatrixXd squares;  ///< HHᵀ of each as a column, one triangle; none where there are very many
+  Eigen::Index rows = 6;    ///< numbers measured per pose
+  bool may_repeat = true;   ///< one candidate may be chosen several times
 
   std::size_t size() const { return poses.size(); }
   Block block(std::size_t k) const { return blocks.middleCols(static_cast<Eigen::Index>(k) * rows, rows); }
@@ -34,6 +35,7 @@ double exchange(const PlanProblem& problem, const CandidatePool& pool, const Cri
                 std::vector<std::size_t>& chosen, std::uint64_t& evaluations, int most_rounds = 1000);
 
 PoseSet poses_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen);
+std::vector<Block> blocks_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen);
 
 struct ExchangeOptions {
   std::size_t candidates = 5000;  ///< where the problem brings none
