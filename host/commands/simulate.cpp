@@ -46,6 +46,7 @@ struct Simulate {
   std::string robot;
   std::string truth;
   unsigned poses = 0;
+  std::string joints;
   std::string measure = "pose";
   std::vector<double> payloads;
   bool context = false;
@@ -54,6 +55,8 @@ struct Simulate {
   std::string out;
 
   void run() const;
+  /// Where to measure and in which context: the file's rows, or random poses.
+  DataFile places(const RobotFile& robot_file, std::mt19937_64& random) const;
   void random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
                       Measurement& row) const;
   void measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
@@ -103,11 +106,41 @@ void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt1
   row.orientation_sigma_rad = level.orientation_sigma_rad;
 }
 
+DataFile Simulate::places(const RobotFile& robot_file, std::mt19937_64& random) const {
+  DataFile data;
+  if (!joints.empty()) {
+    data = load_joints(joints, robot_file);
+    common.warn(data.warnings);
+    // What may have been measured there is not what is measured here.
+    data.extra.clear();
+    for (Measurement& row : data.rows) row.extra.clear();
+    return data;
+  }
+  for (std::size_t k = 0; k < poses; ++k) {
+    Measurement row;
+    row.context = default_context<double>(robot_file.nominal);
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      const JointLimits& limits = robot_file.nominal.limits[j];
+      row.q_rad[j] =
+          rounded_angle(std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random));
+    }
+    if (!payloads.empty()) row.context.payload_kg = payloads[k % payloads.size()];
+    if (context) random_context(k, robot_file, random, row);
+    data.rows.push_back(row);
+  }
+  data.columns.payload_mass = !payloads.empty();
+  data.columns.move.fill(context);
+  data.columns.temperature = data.columns.time = context;
+  return data;
+}
+
 void Simulate::run() const {
   const RobotFile robot_file = load_robot(robot);
   Calibration set = load_calibration(truth, robot_file);
-  DataFile data;
+  std::mt19937_64 random(common.seed);
+  DataFile data = places(robot_file, random);
   data.kind = kinds.at(measure);
+  data.reflectors = 0;
   if (data.kind == MeasurementKind::reflectors) {
     data.reflectors = robot_file.reflectors_m.size();
     if (data.reflectors == 0) {
@@ -121,31 +154,17 @@ void Simulate::run() const {
                                                   radians(frame[3]), radians(frame[4]), radians(frame[5])}));
   }
   const bool noisy = noise != "none";
-  data.columns.payload_mass = !payloads.empty();
-  data.columns.move.fill(context);
-  data.columns.temperature = data.columns.time = context;
   data.columns.position_sigma = noisy;
   data.columns.orientation_sigma = noisy && data.kind == MeasurementKind::pose;
   const auto model = prepare(set.terms, robot_file, truth);
 
-  std::mt19937_64 random(common.seed);
-  for (std::size_t k = 0; k < poses; ++k) {
-    Measurement row;
-    row.context = default_context<double>(robot_file.nominal);
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      const JointLimits& limits = robot_file.nominal.limits[j];
-      row.q_rad[j] =
-          rounded_angle(std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random));
-    }
-    if (!payloads.empty()) row.context.payload_kg = payloads[k % payloads.size()];
-    if (context) random_context(k, robot_file, random, row);
+  for (Measurement& row : data.rows)
     measured(robot_file, measured_pose(*model, set, row.q_rad, row.context), random, row);
-    data.rows.push_back(row);
-  }
   save_data(out, data);
-  common.say(fmt::format("{}: {} random poses of {}, {} measured with noise {}, seed {}", out, poses,
-                         robot_file.name, measure, noise, common.seed));
-  common.write_json({{"poses", poses},
+  common.say(fmt::format("{}: {} {} of {}, {} measured with noise {}, seed {}", out, data.rows.size(),
+                         joints.empty() ? "random poses" : "poses of " + joints, robot_file.name, measure,
+                         noise, common.seed));
+  common.write_json({{"poses", data.rows.size()},
                      {"robot", robot_file.name},
                      {"measure", measure},
                      {"noise", noise},
@@ -162,9 +181,15 @@ void add_simulate(CLI::App& app) {
   command->add_option("--truth", options->truth, "Truth file: the robot's errors by name")
       ->type_name("TRUTH.yaml")
       ->required();
-  command->add_option("--poses", options->poses, "Number of random poses, uniform within the joint limits")
-      ->check(CLI::Range(1U, 10000000U))
-      ->required();
+  CLI::Option_group* where = command->add_option_group("poses", "Where to measure");
+  where->add_option("--poses", options->poses, "Number of random poses, uniform within the joint limits")
+      ->check(CLI::Range(1U, 10000000U));
+  CLI::Option* joints =
+      where
+          ->add_option("--joints", options->joints,
+                       "Poses from a file instead, with its payloads and context: a plan, say")
+          ->type_name("Q.csv");
+  where->require_option(1);
   command->add_option("--measure", options->measure, "What is measured: pose, position or reflectors")
       ->check(CLI::IsMember({"pose", "position", "reflectors"}))
       ->capture_default_str();
@@ -173,9 +198,12 @@ void add_simulate(CLI::App& app) {
                    "Payloads in turn [kg], at the robot file's centre of mass")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
-      ->type_name("KG,KG,…");
-  command->add_flag("--context", options->context,
-                    "Also random motion before each pose [deg], temperature [deg C] and time [s]");
+      ->type_name("KG,KG,…")
+      ->excludes(joints);
+  command
+      ->add_flag("--context", options->context,
+                 "Also random motion before each pose [deg], temperature [deg C] and time [s]")
+      ->excludes(joints);
   command
       ->add_option(
           "--noise", options->noise,
