@@ -55,8 +55,7 @@ struct Simulate {
   std::string out;
 
   void run() const;
-  /// Where to measure and in which context: the file's rows, or random poses.
-  DataFile places(const RobotFile& robot_file, std::mt19937_64& random) const;
+  Measurement random_place(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random) const;
   void random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
                       Measurement& row) const;
   void measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
@@ -106,39 +105,37 @@ void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt1
   row.orientation_sigma_rad = level.orientation_sigma_rad;
 }
 
-DataFile Simulate::places(const RobotFile& robot_file, std::mt19937_64& random) const {
-  DataFile data;
-  if (!joints.empty()) {
-    data = load_joints(joints, robot_file);
-    common.warn(data.warnings);
-    // What may have been measured there is not what is measured here.
-    data.extra.clear();
-    for (Measurement& row : data.rows) row.extra.clear();
-    return data;
+/// Where to measure, and in which context.
+Measurement Simulate::random_place(std::size_t k, const RobotFile& robot_file,
+                                   std::mt19937_64& random) const {
+  Measurement row;
+  row.context = default_context<double>(robot_file.nominal);
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    const JointLimits& limits = robot_file.nominal.limits[j];
+    row.q_rad[j] =
+        rounded_angle(std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random));
   }
-  for (std::size_t k = 0; k < poses; ++k) {
-    Measurement row;
-    row.context = default_context<double>(robot_file.nominal);
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      const JointLimits& limits = robot_file.nominal.limits[j];
-      row.q_rad[j] =
-          rounded_angle(std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random));
-    }
-    if (!payloads.empty()) row.context.payload_kg = payloads[k % payloads.size()];
-    if (context) random_context(k, robot_file, random, row);
-    data.rows.push_back(row);
-  }
-  data.columns.payload_mass = !payloads.empty();
-  data.columns.move.fill(context);
-  data.columns.temperature = data.columns.time = context;
-  return data;
+  if (!payloads.empty()) row.context.payload_kg = payloads[k % payloads.size()];
+  if (context) random_context(k, robot_file, random, row);
+  return row;
 }
 
 void Simulate::run() const {
   const RobotFile robot_file = load_robot(robot);
   Calibration set = load_calibration(truth, robot_file);
-  std::mt19937_64 random(common.seed);
-  DataFile data = places(robot_file, random);
+  DataFile data;
+  if (joints.empty()) {
+    data.columns.payload_mass = !payloads.empty();
+    data.columns.move.fill(context);
+    data.columns.temperature = data.columns.time = context;
+    data.rows.resize(poses);
+  } else {
+    data = load_joints(joints, robot_file);
+    common.warn(data.warnings);
+    // What may have been measured there is not what is measured here.
+    data.extra.clear();
+    for (Measurement& row : data.rows) row.extra.clear();
+  }
   data.kind = kinds.at(measure);
   data.reflectors = 0;
   if (data.kind == MeasurementKind::reflectors) {
@@ -158,8 +155,12 @@ void Simulate::run() const {
   data.columns.orientation_sigma = noisy && data.kind == MeasurementKind::pose;
   const auto model = prepare(set.terms, robot_file, truth);
 
-  for (Measurement& row : data.rows)
+  std::mt19937_64 random(common.seed);
+  for (std::size_t k = 0; k < data.rows.size(); ++k) {
+    Measurement& row = data.rows[k];
+    if (joints.empty()) row = random_place(k, robot_file, random);
     measured(robot_file, measured_pose(*model, set, row.q_rad, row.context), random, row);
+  }
   save_data(out, data);
   common.say(fmt::format("{}: {} {} of {}, {} measured with noise {}, seed {}", out, data.rows.size(),
                          joints.empty() ? "random poses" : "poses of " + joints, robot_file.name, measure,
