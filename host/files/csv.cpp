@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
+#include "files/read_file.hpp"
 
 namespace flexcomp::host {
 
@@ -83,10 +82,7 @@ double CsvTable::number(const CsvRow& row, std::size_t column, const Unit& unit)
 }
 
 CsvTable read_csv(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path, 0, "", "a file that can be read", "none");
-  const std::string content{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (stream.bad()) throw InputError(path, 0, "", "a file that can be read", "a failure while reading");
+  const std::string content = read_file(path);
   std::string_view text = content;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.find('\0') != std::string_view::npos) throw InputError(path, 0, "", "text", "a zero byte");

@@ -10,12 +10,11 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
+#include "files/read_file.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -82,12 +81,7 @@ using LinkPtr = urdf::LinkConstSharedPtr;
 class Tree {
  public:
   explicit Tree(const std::string& path) : path_(path) {
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) throw InputError(path, 0, "", "a file that can be read", "none");
-    std::ostringstream all;
-    all << stream.rdbuf();
-    if (stream.bad() || all.fail()) throw InputError(path, 0, "", "a file that can be read", "nothing in it");
-    const std::string text = all.str();
+    const std::string text = read_file(path);
     // Once for the lines, which liburdfdom does not tell.
     TiXmlDocument xml;
     xml.Parse(text.c_str());

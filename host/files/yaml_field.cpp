@@ -8,6 +8,7 @@
 
 #include "files/nearest.hpp"
 #include "files/quaternion.hpp"
+#include "files/read_file.hpp"
 
 namespace flexcomp::host {
 
@@ -35,24 +36,16 @@ std::string describe(const YAML::Node& node) {
 YamlField::YamlField(YAML::Node node, std::string file, std::string path, std::size_t line)
     : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)), line_(line) {}
 
-YamlField YamlField::root(const std::function<YAML::Node()>& read, const std::string& name) {
+YamlField YamlField::load(const std::string& path) { return parse(read_file(path), path); }
+
+YamlField YamlField::parse(const std::string& text, const std::string& name) {
   try {
-    YamlField root(read(), name, "", 1);
+    YamlField root(YAML::Load(text), name, "", 1);
     if (!root.node_.IsMap()) throw InputError(name, 0, "", "a mapping (key: value)", describe(root.node_));
     return root;
-  } catch (const YAML::BadFile&) {
-    throw InputError(name, 0, "", "a file that can be read", "none");
   } catch (const YAML::Exception& e) {
     throw InputError(name, line_of(e.mark), "", "YAML", e.msg);
   }
-}
-
-YamlField YamlField::load(const std::string& path) {
-  return root([&] { return YAML::LoadFile(path); }, path);
-}
-
-YamlField YamlField::parse(const std::string& text, const std::string& name) {
-  return root([&] { return YAML::Load(text); }, name);
 }
 
 std::size_t YamlField::line() const { return line_; }

@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,7 +56,6 @@ class YamlField {
   double number_or(const std::string& key, const Unit& unit, double otherwise) const;
 
  private:
-  static YamlField root(const std::function<YAML::Node()>& read, const std::string& name);
   YamlField(YAML::Node node, std::string file, std::string path, std::size_t line);
 
   YAML::Node node_;

@@ -15,10 +15,6 @@
 
 namespace flexcomp::host {
 
-/// A column of which less is left after projection on the others counts as confounded with them: a tool point 0.2 mm off
-/// axis 6, as fitted, does not make known what a point on the axis cannot know.
-constexpr double structural_tolerance = 1e-3;
-
 /// A pose worth measuring.
 struct CuringPose {
   std::array<double, joint_count> q_rad{};

@@ -15,8 +15,6 @@ namespace flexcomp::host {
 namespace {
 
 constexpr std::size_t reference_poses = 1000;
-/// As in identify(): a column of which less is left after projection on the others is confounded with them.
-constexpr double confounded_below = 1e-3;
 
 /// Column of the frames' number i: F moves the measured pose in the measurement frame, E in Ftool (F = E = 1).
 Vector6<double> frame_column(std::size_t i, const Pose<double>& pose) {
@@ -90,7 +88,7 @@ PoseInformation::PoseInformation(const RobotFile& robot, ModelKind kind, bool fr
     block(sight, h);
     reference.middleRows(static_cast<Eigen::Index>(6 * k), h.cols()) = h.transpose();
   }
-  const Elimination possible = eliminate(reference, elimination_order(all, paper.set), confounded_below);
+  const Elimination possible = eliminate(reference, elimination_order(all, paper.set), structural_tolerance);
   const std::vector<Column> candidates = columns_;
   const std::vector<std::size_t> candidate_frames = frames_;
   columns_.clear();

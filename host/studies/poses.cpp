@@ -27,6 +27,7 @@ Study study_poses(const StudyOptions& options) {
     curves.y_name = "score";
     for (const NoiseLevel& noise : options.noises) {
       Curve ours{fmt::format("{} planned", noise.name), {}};
+      std::size_t least_known = 0;
       Curve limit{fmt::format("{} limit", noise.name), {}};
       Curve random{fmt::format("{} random", noise.name), {}};
       double at_14 = 0;
@@ -54,6 +55,7 @@ Study study_poses(const StudyOptions& options) {
           const double n = static_cast<double>(counts[k]);
           (is_planned ? ours : random).points.push_back({n, score.mean});
           if (!is_planned) continue;
+          if (least_known == 0 && experiment.missing().empty()) least_known = counts[k];
           limit.points.push_back({n, *row.limit});
           if (counts[k] == 12) before_14 = score.mean;
           if (counts[k] == 14) at_14 = score.mean;
@@ -63,9 +65,10 @@ Study study_poses(const StudyOptions& options) {
       curves.curves.push_back(ours);
       curves.curves.push_back(limit);
       curves.curves.push_back(random);
-      study.notes.push_back(
-          fmt::format("{} {}: planned, two poses more gain {:.4f} from 12 to 14 and {:.4f} from 14 to 16.",
-                      arm.name, noise.name, at_14 - before_14, after_14 - at_14));
+      study.notes.push_back(fmt::format(
+          "{} {}: planned, every parameter is known from {} poses on; two poses more gain {:.4f} from "
+          "12 to 14 and {:.4f} from 14 to 16.",
+          arm.name, noise.name, least_known, at_14 - before_14, after_14 - at_14));
     }
     study.figures.push_back({arm.name + ".", curves});
     study.notes.push_back(arm.about);

@@ -114,6 +114,39 @@ sed 's/alpha_deg: -90, beta/alpha_dge: -90, beta/' "$robot" >typo.yaml
 expect 3 "typo.yaml" "alpha_dge" "alpha_deg" -- "$flexcomp" predict --robot typo.yaml --joints good.csv -o p.csv
 absent p.csv
 
+# --- a folder, or nothing, for a file ---
+mkdir folder
+for option in --robot --data; do
+  for file in folder none.file; do
+    args=(--robot "$robot" --data good.csv -o p.yaml)
+    [[ $option == --robot ]] && args[1]=$file || args[3]=$file
+    expect 3 "$file" "a file that can be read" -- "$flexcomp" identify "${args[@]}"
+  done
+done
+expect 3 "folder" "a file that can be read" -- "$flexcomp" plan --robot "$robot" --cell folder --poses 14 -o p.csv
+expect 3 "folder" "a file that can be read" -- "$flexcomp" import folder -o p.yaml
+absent p.yaml p.csv
+
+# --- what is known beforehand ---
+expect 3 "--fix" "link2.d_mm" "did you mean" -- identify good.csv --fix link2.d_mm
+expect 3 "--fix" "a number" -- identify good.csv --fix link3.d_mm=wide
+expect 3 "--fix" "joint_compliance[joint=7]" -- identify good.csv --fix 'joint_compliance[joint=7].rad_per_nm=1e-5'
+expect 0 -- identify good.csv --fix 'joint_compliance[joint=2].rad_per_nm=1.5e-5' --fix link5.alpha_deg
+printf 'tolerances:\n  link*.d_mm: 0.3\n  lnik3.a_mm: 0.1\n' >tolerances.yaml
+expect 3 "tolerances.yaml:3" "lnik3.a_mm" "link3.a_mm" -- identify good.csv --tolerances tolerances.yaml
+printf 'tolerances:\n  link*.d_mm: -0.3\n' >tolerances.yaml
+expect 3 "tolerances.yaml:2" "above 0" -- identify good.csv --tolerances tolerances.yaml
+
+# --- poses without any payload know no stiffness, and are told which would ---
+expect 0 -- "$flexcomp" simulate --robot "$robot" --truth "$truth" --poses 30 --payloads 0 -o bare.csv --quiet
+expect 5 "joint_compliance[joint=2]" "1.108 kg" -- identify bare.csv
+expect 0 -- identify bare.csv --model no-stiffness
+
+# --- a study that does not exist ---
+expect 2 "fig5" -- "$flexcomp" study fig5
+expect 2 "--repeats" -- "$flexcomp" study fig4 --repeats 1
+expect 2 -- "$flexcomp" simulate --robot "$robot" --truth "$truth" --poses 3 --joints good.csv -o p.csv
+
 # --- a bus that does not answer ---
 expect 4 "127.0.0.1" -- "$flexcomp" status --of modbus-tcp:127.0.0.1:1 --timeout 0.5
 expect 4 "nocan7" -- "$flexcomp" status --of can:nocan7:3 --timeout 0.5

@@ -1,0 +1,15 @@
+/// \file
+/// The bytes of a file that a user named.
+#ifndef FLEXCOMP_HOST_FILES_READ_FILE_HPP
+#define FLEXCOMP_HOST_FILES_READ_FILE_HPP
+
+#include <string>
+
+namespace flexcomp::host {
+
+/// \throws InputError  no such file, no permission, a directory, a failure while reading
+std::string read_file(const std::string& path);
+
+}  // namespace flexcomp::host
+
+#endif
