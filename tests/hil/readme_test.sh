@@ -5,7 +5,7 @@ source=${FLEXCOMP_SOURCE_DIR:?} bin=${FLEXCOMP_BIN_DIR:?}
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 cd -- "$work"
-ln -s "$source/host" "$source/hil" "$source/tests" .
+ln -s "$source/host" "$source/hil" "$source/tests" "$source/docs" .
 PATH=$bin:$PATH /usr/bin/python3 - "$source" <<'PYTHON'
 import re, subprocess, sys
 root = sys.argv[1]
