@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "commands/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/answers.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "commands/progress_bar.hpp"
 #include "files/data_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "commands/progress_bar.hpp"
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
 #include "files/write_file.hpp"
