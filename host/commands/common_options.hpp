@@ -5,11 +5,25 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "catalogue/catalogue.hpp"
+#include "files/data_file.hpp"
+
 namespace flexcomp::host {
+
+/// What options call the models and what is measured.
+inline const std::map<std::string, ModelKind> model_kinds{{"full", ModelKind::full},
+                                                          {"geometric", ModelKind::geometric},
+                                                          {"no-gravity", ModelKind::no_gravity},
+                                                          {"no-stiffness", ModelKind::no_stiffness}};
+inline const std::map<std::string, MeasurementKind> measurement_kinds{
+    {"pose", MeasurementKind::pose},
+    {"position", MeasurementKind::position},
+    {"reflectors", MeasurementKind::reflectors}};
 
 struct CommonOptions {
   std::string json;

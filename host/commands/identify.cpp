@@ -21,10 +21,6 @@
 namespace flexcomp::host {
 namespace {
 
-const std::map<std::string, ModelKind> models{{"full", ModelKind::full},
-                                              {"geometric", ModelKind::geometric},
-                                              {"no-gravity", ModelKind::no_gravity},
-                                              {"no-stiffness", ModelKind::no_stiffness}};
 const std::map<std::string, FrameChoice> frame_choices{{"nominal", FrameChoice::nominal},
                                                        {"fit", FrameChoice::fit}};
 
@@ -163,7 +159,7 @@ void Identify::run() const {
   std::vector<std::string> warnings = file.warnings;
   const std::vector<Observation> rows = observe(file, robot_file, &warnings);
   IdentifyOptions options;
-  options.model = models.at(model);
+  options.model = model_kinds.at(model);
   if (!frames.empty()) options.frames = frame_choices.at(frames);
   options.force = force;
   options.seed = common.seed;
@@ -284,7 +280,7 @@ void add_identify(CLI::App& app) {
           "--model", options->model,
           "full: geometry, joint compliance and link gravity (39 parameters); geometric; no-gravity; "
           "no-stiffness")
-      ->check(CLI::IsMember(models))
+      ->check(CLI::IsMember(model_kinds))
       ->capture_default_str();
   command
       ->add_option("--frames", options->frames,

@@ -34,17 +34,10 @@
 namespace flexcomp::host {
 namespace {
 
-const std::map<std::string, ModelKind> models{{"full", ModelKind::full},
-                                              {"geometric", ModelKind::geometric},
-                                              {"no-gravity", ModelKind::no_gravity},
-                                              {"no-stiffness", ModelKind::no_stiffness}};
 const std::map<std::string, Method> methods{{"refine", Method::refine},
                                             {"exchange", Method::exchange},
                                             {"detmax", Method::detmax},
                                             {"sapso", Method::sapso}};
-const std::map<std::string, MeasurementKind> kinds{{"pose", MeasurementKind::pose},
-                                                   {"position", MeasurementKind::position},
-                                                   {"reflectors", MeasurementKind::reflectors}};
 
 constexpr std::size_t random_sets = 100;
 constexpr std::size_t sampled_poses = 10000;
@@ -168,7 +161,7 @@ Instrument Plan::instrument(MeasurementKind kind, std::size_t reflectors, double
 
 /// What has been measured, with the contexts and the noise it was measured with; and how the rest will be.
 void Plan::take_data(const RobotFile& robot_file, const std::optional<DataFile>& data) {
-  MeasurementKind kind = measure.empty() ? MeasurementKind::pose : kinds.at(measure);
+  MeasurementKind kind = measure.empty() ? MeasurementKind::pose : measurement_kinds.at(measure);
   if (measure.empty() && data && data->kind != MeasurementKind::joints) kind = data->kind;
   Points shape = robot_file.reflectors_m;
   if (shape.empty() && data && data->kind == MeasurementKind::reflectors) {
@@ -185,7 +178,7 @@ void Plan::take_data(const RobotFile& robot_file, const std::optional<DataFile>&
   }
   problem_.instrument =
       instrument(kind, shape.size(), robot_file.position_sigma_m, robot_file.orientation_sigma_rad, shape);
-  for (const auto& [name, k] : kinds) {
+  for (const auto& [name, k] : measurement_kinds) {
     if (k == kind) measure = name;
   }
   if (!data) return;
@@ -436,8 +429,8 @@ void Plan::run() {
   std::vector<Sight> like;
   for (const PoseContext& c : problem_.payloads) like.push_back({Joints{}, c, problem_.instrument});
   like.insert(like.end(), known_.begin(), known_.end());
-  problem_.information =
-      std::make_shared<PoseInformation>(robot_file, models.at(model), frames == "fit", like, common.seed);
+  problem_.information = std::make_shared<PoseInformation>(robot_file, model_kinds.at(model), frames == "fit",
+                                                           like, common.seed);
   std::vector<Block> known(known_.size());
   for (std::size_t k = 0; k < known_.size(); ++k) problem_.information->block(known_[k], known[k]);
   problem_.take_as_known(std::move(known));
@@ -668,9 +661,9 @@ void add_plan(CLI::App& app) {
   command
       ->add_option("--measure", options->measure,
                    "What will be measured: pose, position or reflectors. Default: as in --extend, else pose")
-      ->check(CLI::IsMember(kinds));
+      ->check(CLI::IsMember(measurement_kinds));
   command->add_option("--model", options->model, "What shall be identified, as for identify")
-      ->check(CLI::IsMember(models))
+      ->check(CLI::IsMember(model_kinds))
       ->capture_default_str();
   command
       ->add_option("--frames", options->frames,

@@ -26,10 +26,6 @@ namespace {
 const std::map<std::string, NoiseLevel> noise_levels{
     {noise_n1.name, noise_n1}, {noise_n2.name, noise_n2}, {no_noise.name, no_noise}};
 
-const std::map<std::string, MeasurementKind> kinds{{"pose", MeasurementKind::pose},
-                                                   {"position", MeasurementKind::position},
-                                                   {"reflectors", MeasurementKind::reflectors}};
-
 constexpr double largest_move_rad = radians(30);
 constexpr double seconds_per_pose = 60;
 constexpr double temperature_spread_k = 8;
@@ -91,7 +87,8 @@ void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt1
     return Eigen::Vector3d(x, y, sigma * normal(random));
   };
   for (std::size_t r = 0;
-       r < robot_file.reflectors_m.size() && kinds.at(measure) == MeasurementKind::reflectors; ++r) {
+       r < robot_file.reflectors_m.size() && measurement_kinds.at(measure) == MeasurementKind::reflectors;
+       ++r) {
     row.reflector_m[r] =
         pose.rotation * robot_file.reflectors_m[r] + pose.position + vector(level.position_sigma_m);
   }
@@ -136,7 +133,7 @@ void Simulate::run() const {
     data.extra.clear();
     for (Measurement& row : data.rows) row.extra.clear();
   }
-  data.kind = kinds.at(measure);
+  data.kind = measurement_kinds.at(measure);
   data.reflectors = 0;
   if (data.kind == MeasurementKind::reflectors) {
     data.reflectors = robot_file.reflectors_m.size();

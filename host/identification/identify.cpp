@@ -99,24 +99,6 @@ void fix(const std::vector<FixedParameter>& fixed, const RobotFile& robot, TermS
   }
 }
 
-std::vector<PriorKnowledge> priors(const IdentifyOptions& options, const TermSet& set,
-                                   const std::vector<Parameter>& parameters) {
-  std::vector<PriorKnowledge> list(parameters.size());
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
-    // A torque turns a joint its own way: a negative stiffness is noise.
-    if (options.physical && set.terms[parameters[p].terms.front()].effect == Effect::joint_compliance)
-      list[p].least = 0;
-  }
-  for (const Tolerance& tolerance : options.tolerances) {
-    const std::vector<std::size_t> meant = parameters_meant(tolerance, parameters);
-    for (const std::size_t p : meant) {
-      list[p].expected = tolerance.expected * parameters[p].si_per_file_unit();
-      list[p].tolerance = tolerance.sigma * parameters[p].si_per_file_unit();
-    }
-  }
-  return list;
-}
-
 }  // namespace
 
 Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows, Estimate* fitted) {
@@ -155,7 +137,7 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   if (fit_frames_too) all.frames = free_frames(rows);
   all.parameters = paper.parameters;
   fix(options.fixed, robot, start.set, all.parameters);
-  all.prior = priors(options, start.set, all.parameters);
+  all.prior = prior_knowledge(start.set, all.parameters, options.physical, options.tolerances);
   // At the nominal arm, where nothing is parallel by accident only.
   out.known = what_is_knowable(robot, rows, start, all, options.seed);
   const Unknowns& fitted = out.known.fitted;

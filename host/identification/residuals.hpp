@@ -5,13 +5,13 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "catalogue/host_model.hpp"
 #include "catalogue/term_set.hpp"
 #include "flexcomp/linear.hpp"
+#include "identification/prior_knowledge.hpp"
 #include "measurement/observation.hpp"
 
 namespace flexcomp::host {
@@ -21,13 +21,6 @@ struct Estimate {
   TermSet set;
   Pose<double> f;  ///< Fb in the measurement frame
   Pose<double> e;  ///< measured frame in Ftool
-};
-
-/// What is known of a parameter before anything is measured, SI.
-struct PriorKnowledge {
-  double least = -std::numeric_limits<double>::infinity();  ///< physics forbids less: 0 for a compliance
-  double expected = 0;
-  double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
 };
 
 /// Which numbers a fit may move. Frames come first in every matrix, then the parameters.

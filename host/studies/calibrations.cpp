@@ -73,17 +73,8 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
   start_.set = paper.set;
   Unknowns all;
   all.parameters = paper.parameters;
-  all.prior.resize(all.parameters.size());
-  for (std::size_t p = 0; p < all.parameters.size() && options.method == Method::ours; ++p) {
-    if (paper.set.terms[all.parameters[p].terms.front()].effect == Effect::joint_compliance)
-      all.prior[p].least = 0;
-  }
-  for (const Tolerance& tolerance : options.tolerances) {
-    for (const std::size_t p : parameters_meant(tolerance, all.parameters)) {
-      all.prior[p].expected = tolerance.expected * all.parameters[p].si_per_file_unit();
-      all.prior[p].tolerance = tolerance.sigma * all.parameters[p].si_per_file_unit();
-    }
-  }
+  all.prior =
+      prior_knowledge(paper.set, all.parameters, options.method == Estimation::ours, options.tolerances);
   const Knowable known = what_is_knowable(arm.robot, clean_, start_, all, structure_seed);
   missing_ = known.missing;
   unknowns_ = known.fitted;
@@ -135,13 +126,13 @@ Estimate Experiment::calibrate(std::uint64_t seed) const {
 }
 
 Estimate Experiment::from(const std::vector<Observation>& measured) const {
-  if (options_.method == Method::m_lm || options_.method == Method::ours) {
+  if (options_.method == Estimation::m_lm || options_.method == Estimation::ours) {
     EstimatorOptions how;
-    how.robust = options_.method == Method::ours;
+    how.robust = options_.method == Estimation::ours;
     return fit(start_, unknowns_, measured, arm_.robot, how).estimate;
   }
   std::vector<Observation> rows = measured;
-  if (options_.method == Method::unweighted) {
+  if (options_.method == Estimation::unweighted) {
     for (Observation& row : rows) {
       row.whitening.topLeftCorner<3, 3>().diagonal().setConstant(1e3);
       if (row.has_orientation) row.whitening.bottomRightCorner<3, 3>().diagonal().setConstant(1);

@@ -20,7 +20,7 @@
 namespace flexcomp::host {
 
 /// How parameters come from residuals.
-enum class Method {
+enum class Estimation {
   m_lm,  ///< modified Levenberg-Marquardt (Eq. 36, 37), whitened, every row in full, no bounds: the paper's
   ours,  ///< the default of `identify`: bounded compliances, robust loss
   least_squares,  ///< one linear solution with H of the nominal arm (Eq. 24), whitened
@@ -30,7 +30,7 @@ enum class Method {
 struct ExperimentOptions {
   bool orientations = true;  ///< false: positions only
   ModelKind model = ModelKind::full;
-  Method method = Method::m_lm;
+  Estimation method = Estimation::m_lm;
   NoiseLevel noise = noise_n1;
   std::vector<Tolerance> tolerances;
   /// Fit what random poses of this kind would know even where these poses know it badly or not at all (where nothing

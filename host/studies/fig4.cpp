@@ -52,16 +52,16 @@ Study study_fig4(const StudyOptions& options) {
   struct Case {
     const char* model;
     bool orientations;
-    Method method;
+    Estimation method;
     bool settled;
     std::optional<double> paper;  // TX60L, N1
   };
   const std::vector<Case> cases{
-      {"pose", true, Method::m_lm, false, 0.8218},
-      {"pose, unweighted mm and rad", true, Method::unweighted, false, {}},
-      {"position", false, Method::m_lm, false, {}},
-      {"pose", true, Method::least_squares, true, {}},
-      {"position", false, Method::least_squares, true, {}},
+      {"pose", true, Estimation::m_lm, false, 0.8218},
+      {"pose, unweighted mm and rad", true, Estimation::unweighted, false, {}},
+      {"position", false, Estimation::m_lm, false, {}},
+      {"pose", true, Estimation::least_squares, true, {}},
+      {"position", false, Estimation::least_squares, true, {}},
   };
   double done = 0;
   const double all = static_cast<double>(options.arms.size() * options.noises.size() * cases.size());
@@ -101,10 +101,10 @@ Study study_fig4(const StudyOptions& options) {
         if (arm.name == "TX60L" && std::string(noise.name) == "N1") row.paper = c.paper;
         row.ours = score;
         row.uncertainty = std::sqrt(between / pose_sets);
-        if (!c.settled && c.method == Method::m_lm) row.limit = limit;
+        if (!c.settled && c.method == Estimation::m_lm) row.limit = limit;
         if (c.settled) {
           row.remark = "fails: `identify` refuses it with exit 5 and says which poses cure it";
-        } else if (c.method == Method::m_lm && c.orientations) {
+        } else if (c.method == Estimation::m_lm && c.orientations) {
           row.remark = fmt::format("one set of poses settles to 1 % after {:.0f} repeats", repeats);
         }
         study.rows.push_back(row);

@@ -18,7 +18,7 @@ struct Case {
   const char* poses;
   const char* estimator;
   Planning planning;
-  Method method;
+  Estimation method;
   std::optional<double> paper_n1;  // TX60L
   std::optional<double> paper_n2;
 };
@@ -68,14 +68,14 @@ Study study_fig8(const StudyOptions& options) {
   study.quantity = "mean score of the parameters (1 is perfect)";
   study.label_names = {"arm", "noise", "14 poses by", "estimator"};
   const std::vector<Case> cases{
-      {"SAPSO (paper's proposal)", "M-LM", Planning::sapso, Method::m_lm, 0.958, 0.927},
-      {"SAPSO", "least squares", Planning::sapso, Method::least_squares, {}, {}},
-      {"SAPSO, Omin in expectation", "M-LM", Planning::sapso_expected, Method::m_lm, {}, {}},
-      {"DETMAX (paper's baseline)", "least squares", Planning::detmax, Method::least_squares, {}, {}},
-      {"DETMAX", "M-LM", Planning::detmax, Method::m_lm, {}, {}},
-      {"random", "M-LM", Planning::random, Method::m_lm, {}, {}},
-      {"our plan", "M-LM", Planning::ours, Method::m_lm, {}, {}},
-      {"our plan", "our default", Planning::ours, Method::ours, {}, {}},
+      {"SAPSO (paper's proposal)", "M-LM", Planning::sapso, Estimation::m_lm, 0.958, 0.927},
+      {"SAPSO", "least squares", Planning::sapso, Estimation::least_squares, {}, {}},
+      {"SAPSO, Omin in expectation", "M-LM", Planning::sapso_expected, Estimation::m_lm, {}, {}},
+      {"DETMAX (paper's baseline)", "least squares", Planning::detmax, Estimation::least_squares, {}, {}},
+      {"DETMAX", "M-LM", Planning::detmax, Estimation::m_lm, {}, {}},
+      {"random", "M-LM", Planning::random, Estimation::m_lm, {}, {}},
+      {"our plan", "M-LM", Planning::ours, Estimation::m_lm, {}, {}},
+      {"our plan", "our default", Planning::ours, Estimation::ours, {}, {}},
   };
   for (const StudiedArm& arm : options.arms) {
     const double payload = arm.robot.nominal.payload_kg;
@@ -123,6 +123,8 @@ Study study_fig8(const StudyOptions& options) {
         const Experiment experiment(arm, planned.at(c.planning), how);
         study.rows.push_back(row_of(arm, noise, c.poses, c.estimator, experiment,
                                     repeated_score(experiment, options.repeats, options.seed), true));
+        study.rows.back().remark +=
+            fmt::format(", criterion {:.4g}", criterion_of(arm, planned.at(c.planning)));
         if (arm.name == "TX60L") study.rows.back().paper = n1 ? c.paper_n1 : c.paper_n2;
       }
       {
@@ -140,7 +142,7 @@ Study study_fig8(const StudyOptions& options) {
       }
       for (std::size_t v = 0; v < variations.size(); ++v) {
         ExperimentOptions how;
-        how.method = Method::ours;
+        how.method = Estimation::ours;
         how.noise = noise;
         if (variations[v].tolerances) how.tolerances = usual_tolerances();
         const Experiment experiment(varied[v].first, varied[v].second, how);

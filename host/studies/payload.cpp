@@ -53,7 +53,7 @@ Study study_payload(const StudyOptions& options) {
         const std::vector<Observation> others =
             clean_rows(arm, random_poses(arm, 100, options.seed + 1000), true, noise);
         ExperimentOptions how;
-        how.method = Method::ours;
+        how.method = Estimation::ours;
         how.noise = noise;
         how.insist = true;
         const Experiment full(arm, poses, how);

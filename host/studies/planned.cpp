@@ -7,9 +7,8 @@
 #include <random>
 
 #include "files/cell_file.hpp"
-#include "planning/detmax.hpp"
 #include "planning/feasibility.hpp"
-#include "planning/refine.hpp"
+#include "planning/planner.hpp"
 #include "planning/sapso.hpp"
 
 namespace flexcomp::host {
@@ -67,14 +66,24 @@ PlanProblem problem_of(const StudiedArm& arm, std::size_t count, const std::vect
   return problem;
 }
 
+/// Poses with the arm's own payload.
+PoseSet set_of(const std::vector<StudiedPose>& poses) {
+  PoseSet set;
+  for (const StudiedPose& pose : poses) set.push_back({pose.q_rad, 0});
+  return set;
+}
+
 }  // namespace
+
+double criterion_of(const StudiedArm& arm, const std::vector<StudiedPose>& poses) {
+  const PlanProblem problem = problem_of(arm, poses.size(), {});
+  return problem.criterion().fitness(figures_of(problem, set_of(poses)).figures);
+}
 
 Eigen::VectorXd errors_at_the_chosen_draw(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                                           std::uint64_t seed, const std::vector<Parameter>& parameters) {
   const PlanProblem problem = problem_of(arm, poses.size(), {});
-  PoseSet set;
-  for (const StudiedPose& pose : poses) set.push_back({pose.q_rad, 0});
-  const Eigen::VectorXd in_units = OracleObjective(problem, seed).errors(set);
+  const Eigen::VectorXd in_units = OracleObjective(problem, seed).errors(set_of(poses));
   const std::vector<std::string>& names = problem.information->names();
   Eigen::VectorXd errors(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t p = 0; p < parameters.size(); ++p) {
@@ -99,26 +108,22 @@ std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count,
   switch (how) {
     case Planning::random:
       break;
-    case Planning::detmax: {
-      DetmaxOptions options;
-      options.seed = seed;
-      search = std::make_unique<DetmaxSearch>(problem, options);
+    case Planning::detmax:
+      search = make_search(Method::detmax, problem, 1, seed);
       break;
-    }
-    case Planning::sapso:
-    case Planning::sapso_expected: {
+    case Planning::sapso: {
       SapsoOptions options;
       options.seed = seed;
-      if (how == Planning::sapso) options.objective = OracleObjective(problem, seed);
+      options.objective = OracleObjective(problem, seed);
       search = std::make_unique<SapsoSearch>(problem, options);
       break;
     }
-    case Planning::ours: {
-      RefineOptions options;
-      options.seed = seed;
-      search = std::make_unique<RefineSearch>(problem, options);
+    case Planning::sapso_expected:
+      search = make_search(Method::sapso, problem, 1, seed);
       break;
-    }
+    case Planning::ours:
+      search = make_search(Method::refine, problem, 1, seed);
+      break;
   }
   PoseSet set;
   if (search) {

@@ -24,6 +24,9 @@ enum class Planning {
 std::vector<StudiedPose> planned_poses(const StudiedArm& arm, std::size_t count, Planning how,
                                        std::uint64_t seed, const std::vector<double>& payloads_kg = {});
 
+/// The criterion of planning, expected Omin / O1 (Eq. 33; smaller is better), at poses with the arm's own payload.
+double criterion_of(const StudiedArm& arm, const std::vector<StudiedPose>& poses);
+
 /// What the least squares estimate is off by at poses of Planning::sapso for the very draw of noise (N1) that they were
 /// chosen with, SI, in the order of `parameters`.
 Eigen::VectorXd errors_at_the_chosen_draw(const StudiedArm& arm, const std::vector<StudiedPose>& poses,

@@ -36,7 +36,7 @@ Study study_poses(const StudyOptions& options) {
       for (std::size_t k = 0; k < counts.size(); ++k) {
         for (const bool is_planned : {true, false}) {
           ExperimentOptions how;
-          how.method = Method::ours;
+          how.method = Estimation::ours;
           how.noise = noise;
           how.insist = true;
           const Experiment experiment(

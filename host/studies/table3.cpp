@@ -134,7 +134,7 @@ Study study_table3(const StudyOptions& options) {
         ExperimentOptions how;
         how.orientations = m.orientations;
         how.model = m.kind;
-        how.method = Method::ours;
+        how.method = Estimation::ours;
         how.noise = noise;
         how.insist = true;
         const Experiment experiment(m.orientations ? arm : flange, poses, how);

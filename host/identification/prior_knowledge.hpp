@@ -1,0 +1,28 @@
+/// \file
+/// What is known of parameters before anything is measured.
+#ifndef FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
+#define FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
+
+#include <limits>
+#include <vector>
+
+#include "catalogue/term_set.hpp"
+#include "files/tolerance_file.hpp"
+
+namespace flexcomp::host {
+
+/// Of one parameter, SI.
+struct PriorKnowledge {
+  double least = -std::numeric_limits<double>::infinity();  ///< physics forbids less: 0 for a compliance
+  double expected = 0;
+  double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
+};
+
+/// One per parameter. \param physical  a torque turns a joint its own way: compliances are 0 or more
+/// \throws InputError  a tolerance that speaks of no parameter; of two that speak of one the later wins
+std::vector<PriorKnowledge> prior_knowledge(const TermSet& set, const std::vector<Parameter>& parameters,
+                                            bool physical, const std::vector<Tolerance>& tolerances);
+
+}  // namespace flexcomp::host
+
+#endif
