@@ -82,6 +82,7 @@ class Tree {
  public:
   explicit Tree(const std::string& path) : path_(path) {
     const std::string text = read_file(path);
+    if (text.empty()) throw InputError(path, 0, "", "a file that can be read", "nothing in it");
     // Once for the lines, which liburdfdom does not tell.
     TiXmlDocument xml;
     xml.Parse(text.c_str());

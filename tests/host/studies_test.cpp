@@ -24,11 +24,13 @@ namespace {
 using namespace flexcomp;
 using namespace flexcomp::host;
 
+// Under sanitizers everything is ten times slower: the memory is watched there, the figures are judged without.
 #if defined(__SANITIZE_ADDRESS__)
-constexpr std::size_t kRepeats = 40;
+constexpr bool kSanitized = true;
 #else
-constexpr std::size_t kRepeats = 200;
+constexpr bool kSanitized = false;
 #endif
+constexpr std::size_t kRepeats = kSanitized ? 40 : 200;
 
 StudyOptions of(const StudiedArm& arm, const NoiseLevel& noise, std::size_t repeats = kRepeats) {
   StudyOptions options;
@@ -153,7 +155,9 @@ TEST(Study, Fig4GivesThePapersScoreAndSettledOrientationFails) {
 
 // The mean residual of repeated calibrations is what the covariance of the parameters says, within 5 %.
 TEST(Study, Table3ReachesTheNoiseLimitedBound) {
-  for (const StudiedArm& arm : {paper_tx60l(), paper_rx160l()}) {
+  std::vector<StudiedArm> arms{paper_tx60l()};
+  if (!kSanitized) arms.push_back(paper_rx160l());
+  for (const StudiedArm& arm : arms) {
     const Study study = study_table3(of(arm, noise_n1, 100));
     const StudyRow& before = row(study, {"nominal"});
     EXPECT_NEAR(*before.ours, *before.paper, 0.05);
@@ -180,6 +184,7 @@ TEST(Planned, OurPlanRaisesTheLimitToWhatIsKnownOfTheSetUp) {
   const auto plan = planned_poses(arm, 14, Planning::ours, 1);
   EXPECT_NEAR(Experiment(arm, plan, n1).cramer_rao_score(), 0.86, 0.01) << "model.md section 5";
   EXPECT_NEAR(Experiment(arm, plan, n2).cramer_rao_score(), 0.78, 0.01);
+  if (kSanitized) return;
   StudiedArm heavy = arm;
   heavy.robot.nominal.payload_kg = 5;
   const auto loaded = planned_poses(heavy, 14, Planning::ours, 1);
