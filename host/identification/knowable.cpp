@@ -44,10 +44,9 @@ Eigen::MatrixXd select_both(const Eigen::MatrixXd& m, const std::vector<std::siz
 
 /// The columns of some rows beside those of as many random ones, as far as judging them needs it.
 struct Judge {
-  Eigen::MatrixXd data;      ///< triangular factor of the rows, or the rows themselves
-  Eigen::MatrixXd usual;     ///< information of random rows, per as many as there are
-  std::size_t frames = 0;    ///< the first so many columns are frames: never dropped
-  std::vector<bool> held{};  ///< per column: a tolerance holds it, nothing need be dropped
+  Eigen::MatrixXd data;    ///< triangular factor of the rows, or the rows themselves
+  Eigen::MatrixXd usual;   ///< information of random rows, per as many as there are
+  std::size_t frames = 0;  ///< the first so many columns are frames: never dropped
 
   /// Known in principle is not known: a parameter whose standard deviation is over 30 units (3 mm, 1.5 degrees) and
   /// over 30 times what as many random poses would give is left out, the last in the order first, until none is.
