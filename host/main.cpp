@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   add_plan(app);
   add_identify(app);
   add_validate(app);
+  add_diagnose(app);
   add_predict(app);
   add_compensate(app);
   add_push(app);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "units.hpp"
@@ -32,6 +33,16 @@ std::string accuracy_table(const Before& before, const ErrorStatistics& after) {
   text += line("after", after);
   text.pop_back();
   return text;
+}
+
+void add_outlier_warning(std::vector<std::string>& warnings, const std::string& data,
+                         const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers) {
+  if (outliers.empty()) return;
+  std::string lines;
+  const std::size_t shown = std::min<std::size_t>(outliers.size(), 8);
+  for (std::size_t k = 0; k < shown; ++k) lines += fmt::format(" {}", rows[outliers[k]].line);
+  warnings.push_back(fmt::format("{}: {} of {} rows lie outside the bulk and count less: lines{}{}", data,
+                                 outliers.size(), rows.size(), lines, shown < outliers.size() ? " …" : ""));
 }
 
 std::string joined(const std::vector<std::string>& lines) {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "identification/identify.hpp"
 
@@ -18,6 +19,10 @@ nlohmann::ordered_json to_json(const Before& before);
 
 /// The three or two lines of a table: before (nominal frames, fitted frames) and after.
 std::string accuracy_table(const Before& before, const ErrorStatistics& after);
+
+/// Says where rows do not count in full: their lines, the first eight of them.
+void add_outlier_warning(std::vector<std::string>& warnings, const std::string& data,
+                         const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers);
 
 /// Joins doubts into one message, each on a line of its own.
 std::string joined(const std::vector<std::string>& lines);

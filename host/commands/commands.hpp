@@ -12,6 +12,7 @@ void add_simulate(CLI::App& app);
 void add_plan(CLI::App& app);
 void add_identify(CLI::App& app);
 void add_validate(CLI::App& app);
+void add_diagnose(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_compensate(CLI::App& app);
 void add_push(CLI::App& app);

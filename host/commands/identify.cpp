@@ -168,14 +168,7 @@ void Identify::run() const {
   for (const std::string& text : fix) options.fixed.push_back(fixed_parameter(text, robot_file));
   if (!tolerances.empty()) options.tolerances = load_tolerances(tolerances);
   const Identification r = identify(robot_file, rows, data, options);
-  if (!r.outliers.empty()) {
-    std::string lines;
-    const std::size_t shown = std::min<std::size_t>(r.outliers.size(), 8);
-    for (std::size_t k = 0; k < shown; ++k) lines += fmt::format(" {}", rows[r.outliers[k]].line);
-    warnings.push_back(fmt::format("{}: {} of {} rows lie outside the bulk and count less: lines{}{}", data,
-                                   r.outliers.size(), rows.size(), lines,
-                                   shown < r.outliers.size() ? " …" : ""));
-  }
+  add_outlier_warning(warnings, data, rows, r.outliers);
   common.warn(warnings);
   save_calibration(out, r.calibration, robot_file);
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
@@ -31,12 +32,13 @@ struct Push {
   bool allow_unnamed = false;
 
   void run() const;
-  Bytes make(ControllerClient& client) const;
+  Bytes make(ControllerClient& client, std::vector<std::string>& left_out) const;
 };
 
-Bytes Push::make(ControllerClient& client) const {
+Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) const {
   const RobotFile for_robot = robot_of(client, robot);
   const Calibration calibration = load_calibration_for(client, set, for_robot);
+  left_out = never_pushed(calibration, for_robot);
   ImageOptions options;
   options.allow_unnamed = allow_unnamed;
   Bytes out = make_image(calibration, for_robot, sequence ? *sequence : next_sequence(client), options);
@@ -65,7 +67,12 @@ void Push::run() const {
     return;
   }
 
-  const Bytes bytes = ready ? *ready : make(*client);
+  std::vector<std::string> left_out;
+  const Bytes bytes = ready ? *ready : make(*client, left_out);
+  if (!left_out.empty()) {
+    bus.say(
+        fmt::format("{}: left out, for they belong to the measurement: {}", set, fmt::join(left_out, ", ")));
+  }
   if (!image.empty()) {
     write_file(image, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
@@ -88,6 +95,7 @@ void Push::run() const {
   result["sequence"] = now.active_sequence;
   result["bytes"] = bytes.size();
   result["crc"] = fmt::format("{:08x}", now.active_crc);
+  result["left_out"] = left_out;
   result["trial"] = trial_s.has_value();
   result["seconds"] = took.count();
   bus.say(fmt::format("{}: set {} is active{}: {} bytes, read back and equal, {:.2f} s", client->where(),

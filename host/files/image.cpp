@@ -68,6 +68,14 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
   return bytes;
 }
 
+std::vector<std::string> never_pushed(const Calibration& calibration, const RobotFile& robot) {
+  std::vector<std::string> names;
+  for (const EffectGroup& group : effects_of(calibration.terms, robot.nominal)) {
+    if (is_measurement_effect(group.id.effect)) names.push_back(name(group.id));
+  }
+  return names;
+}
+
 Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const RobotFile& robot,
                                    const std::string& source) {
   const auto refuse = [&](const std::string& found) {

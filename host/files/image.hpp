@@ -26,6 +26,9 @@ struct ImageOptions {
 std::vector<std::uint8_t> make_image(const Calibration& calibration, const RobotFile& robot,
                                      std::uint32_t sequence, const ImageOptions& options = {});
 
+/// Effects of a calibration that no image has, because they belong to the measurement and not to the arm: their names.
+std::vector<std::string> never_pushed(const Calibration& calibration, const RobotFile& robot);
+
 /// Reads an image back into named terms. `source` stands for the file in messages (a file or a bus).
 /// \throws InputError  truncated, altered, for another robot, or with terms that the catalogue cannot name
 Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const RobotFile& robot,

@@ -37,29 +37,6 @@ double spread(const std::vector<Eigen::Vector3d>& points) {
   return std::sqrt(sum);
 }
 
-void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
-                            const Before& before, const std::string& source) {
-  const double limit = suspicious_factor * usual_error_per_reach * reach(robot);
-  const double found = before.fitted_frames
-                           ? std::min(before.fitted_frames->rms_m, before.nominal_frames.rms_m)
-                           : before.nominal_frames.rms_m;
-  if (!(found > limit)) return;
-  std::vector<Eigen::Vector3d> measured;
-  std::vector<Eigen::Vector3d> nominal;
-  const auto model = prepare(TermSet(), robot, source);
-  for (const Observation& row : rows) {
-    measured.push_back(row.p_m);
-    nominal.push_back(nominal_forward(*model, row.q_rad).position);
-  }
-  const double ratio = spread(measured) / std::max(spread(nominal), 1e-9);
-  std::string suspicion = "the data belong to another arm, or joints are in another order or sign";
-  if (ratio < 0.01) suspicion = "positions are in metres, not in millimetres";
-  if (ratio > 100) suspicion = "positions are in micrometres, not in millimetres";
-  throw InputError(source, 0, "x_mm y_mm z_mm",
-                   fmt::format("residuals to the nominal {} below {:.0f} mm", robot.name, limit * 1e3),
-                   fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
-}
-
 /// Terms that are neither fitted nor given say nothing: they are left out of the calibration.
 void keep_what_was_identified(Calibration& calibration, const TermSet& set, const Unknowns& fitted,
                               const Eigen::VectorXd& sigma) {
@@ -115,12 +92,35 @@ Before errors_before(const RobotFile& robot, const std::vector<Observation>& row
   return before;
 }
 
+void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
+                            const std::string& source, const Before& before) {
+  const double limit = suspicious_factor * usual_error_per_reach * reach(robot);
+  const double found = before.fitted_frames
+                           ? std::min(before.fitted_frames->rms_m, before.nominal_frames.rms_m)
+                           : before.nominal_frames.rms_m;
+  if (!(found > limit)) return;
+  std::vector<Eigen::Vector3d> measured;
+  std::vector<Eigen::Vector3d> nominal;
+  const auto model = prepare(TermSet(), robot, source);
+  for (const Observation& row : rows) {
+    measured.push_back(row.p_m);
+    nominal.push_back(nominal_forward(*model, row.q_rad).position);
+  }
+  const double ratio = spread(measured) / std::max(spread(nominal), 1e-9);
+  std::string suspicion = "the data belong to another arm, or joints are in another order or sign";
+  if (ratio < 0.01) suspicion = "positions are in metres, not in millimetres";
+  if (ratio > 100) suspicion = "positions are in micrometres, not in millimetres";
+  throw InputError(source, 0, "x_mm y_mm z_mm",
+                   fmt::format("residuals to the nominal {} below {:.0f} mm", robot.name, limit * 1e3),
+                   fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
+}
+
 Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
                         const std::string& source, const IdentifyOptions& options) {
   Identification out;
   Estimate start;
   out.before = errors_before(robot, rows, &start);
-  if (!options.force) refuse_the_implausible(robot, rows, out.before, source);
+  if (!options.force) refuse_the_implausible(robot, rows, source, out.before);
 
   Estimate nominal;
   const auto nominal_model = prepare(TermSet(), robot, source);

@@ -71,6 +71,10 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
 Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows,
                      Estimate* fitted = nullptr);
 
+/// \throws InputError  the rows are further from the nominal arm than any arm of this size: another unit, another arm
+void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
+                            const std::string& source, const Before& before);
+
 }  // namespace flexcomp::host
 
 #endif

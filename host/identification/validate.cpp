@@ -44,7 +44,21 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
   return lin.residual.squaredNorm() - ar.dot(inner.llt().solve(ar));
 }
 
+Estimate estimate_of(const Calibration& calibration) {
+  Estimate estimate;
+  estimate.set = calibration.terms;
+  estimate.f = calibration.f();
+  estimate.e = calibration.e();
+  return estimate;
+}
+
 }  // namespace
+
+std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibration& calibration,
+                                        const std::vector<Observation>& rows) {
+  const auto model = prepare(calibration.terms, robot, calibration.path);
+  return residuals(estimate_of(calibration), *model, rows);
+}
 
 Validation validate(const RobotFile& robot, const Calibration& calibration,
                     const std::vector<Observation>& rows, const std::string& source) {
@@ -55,10 +69,7 @@ Validation validate(const RobotFile& robot, const Calibration& calibration,
   const auto nominal = prepare(TermSet(), robot, robot.path);
   out.nominal = residuals(fitted, *nominal, rows);
 
-  Estimate estimate;
-  estimate.set = calibration.terms;
-  estimate.f = calibration.f();
-  estimate.e = calibration.e();
+  const Estimate estimate = estimate_of(calibration);
   const auto model = prepare(estimate.set, robot, calibration.path);
   out.residuals = residuals(estimate, *model, rows);
   out.after = statistics(out.residuals, rows);

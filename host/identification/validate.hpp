@@ -29,6 +29,10 @@ struct Validation {
 Validation validate(const RobotFile& robot, const Calibration& calibration,
                     const std::vector<Observation>& rows, const std::string& source);
 
+/// Residuals of rows against a calibration, in its frames.
+std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibration& calibration,
+                                        const std::vector<Observation>& rows);
+
 }  // namespace flexcomp::host
 
 #endif

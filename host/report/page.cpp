@@ -72,6 +72,40 @@ std::string figure(const std::string& svg, const std::string& caption) {
   return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", svg, caption);
 }
 
+using Cells = std::vector<std::string>;
+
+/// A table whose first column names its rows.
+std::string table(const Cells& columns, const std::vector<Cells>& rows, const char* kind = "") {
+  std::string out = fmt::format("<div class=\"scroll\"><table{}><thead><tr>", kind);
+  for (const std::string& name : columns) out += fmt::format("<th scope=\"col\">{}</th>", escaped(name));
+  out += "</tr></thead><tbody>\n";
+  for (const Cells& row : rows) {
+    out += "<tr>";
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      out += k == 0 ? fmt::format("<th scope=\"row\">{}</th>", escaped(row[k]))
+                    : fmt::format("<td>{}</td>", escaped(row[k]));
+    }
+    out += "</tr>\n";
+  }
+  return out + "</tbody></table></div>\n";
+}
+
+/// Joint readings, a pose a row.
+std::string poses_table(const std::vector<std::array<double, joint_count>>& q_rad,
+                        const std::vector<double>& payload_kg, int decimals) {
+  Cells columns{"pose"};
+  for (std::size_t j = 0; j < joint_count; ++j) columns.push_back(fmt::format("q{} [deg]", j + 1));
+  if (!payload_kg.empty()) columns.emplace_back("payload [kg]");
+  std::vector<Cells> rows;
+  for (std::size_t k = 0; k < q_rad.size(); ++k) {
+    Cells row{fmt::format("{}", k + 1)};
+    for (const double v : q_rad[k]) row.push_back(fmt::format("{:.{}f}", degrees(v), decimals));
+    if (!payload_kg.empty()) row.push_back(fmt::format("{:g}", payload_kg[k]));
+    rows.push_back(row);
+  }
+  return table(columns, rows);
+}
+
 std::string summary_row(const char* name, double before, double after) {
   const std::string change = after > 0 && before > 0 ? fmt::format("{:.1f} ×", before / after) : "–";
   return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n", name,
@@ -234,15 +268,7 @@ std::string limits_of_the_data(const Page& page) {
         "<section><h2>Missing in these data</h2>\n<p>Other poses of the same kind would know them: {}.</p>\n",
         joined(page.missing));
     if (!page.cure_rad.empty()) {
-      out += "<p>Poses that would cure it, best first [deg]:</p><div class=\"scroll\"><table><thead><tr>";
-      for (std::size_t j = 0; j < joint_count; ++j) out += fmt::format("<th scope=\"col\">q{}</th>", j + 1);
-      out += "</tr></thead><tbody>\n";
-      for (const auto& q : page.cure_rad) {
-        out += "<tr>";
-        for (const double v : q) out += fmt::format("<td>{:.1f}</td>", degrees(v));
-        out += "</tr>\n";
-      }
-      out += "</tbody></table></div>\n";
+      out += "<p>Poses that would cure it, best first:</p>" + poses_table(page.cure_rad, {}, 1);
     }
     out += "</section>\n";
   }
@@ -251,37 +277,20 @@ std::string limits_of_the_data(const Page& page) {
 
 std::string results_table(const Page& page) {
   if (page.results.empty()) return "";
-  std::string out =
-      "<section><h2>Other data</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">data</th>"
-      "<th scope=\"col\">poses</th><th scope=\"col\">before, mean [mm]</th><th scope=\"col\">after, mean "
-      "[mm]</th></tr></thead><tbody>\n";
+  std::vector<Cells> rows;
   std::string remarks;
   for (const PageResult& r : page.results) {
-    out += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                       escaped(r.title), r.poses, shown(r.before_m * 1e3), shown(r.after_m * 1e3));
+    rows.push_back({r.title, fmt::format("{}", r.poses), shown(r.before_m * 1e3), shown(r.after_m * 1e3)});
     if (!r.remark.empty()) remarks += fmt::format("<p>{}: {}</p>\n", escaped(r.title), escaped(r.remark));
   }
-  return out + "</tbody></table></div>\n" + remarks + "</section>\n";
+  return "<section><h2>Other data</h2>\n" +
+         table({"data", "poses", "before, mean [mm]", "after, mean [mm]"}, rows) + remarks + "</section>\n";
 }
 
 std::string free_section(const PageSection& section) {
   std::string out = fmt::format("<section><h2>{}</h2>\n", escaped(section.title));
   for (const std::string& text : section.paragraphs) out += fmt::format("<p>{}</p>\n", escaped(text));
-  if (!section.columns.empty()) {
-    out += "<div class=\"scroll\"><table><thead><tr>";
-    for (const std::string& name : section.columns)
-      out += fmt::format("<th scope=\"col\">{}</th>", escaped(name));
-    out += "</tr></thead><tbody>\n";
-    for (const std::vector<std::string>& row : section.rows) {
-      out += "<tr>";
-      for (std::size_t k = 0; k < row.size(); ++k) {
-        out += k == 0 ? fmt::format("<th scope=\"row\">{}</th>", escaped(row[k]))
-                      : fmt::format("<td>{}</td>", escaped(row[k]));
-      }
-      out += "</tr>\n";
-    }
-    out += "</tbody></table></div>\n";
-  }
+  if (!section.columns.empty()) out += table(section.columns, section.rows);
   if (!section.figures.empty()) {
     out += "<div class=\"plots wide\">\n";
     for (const auto& [svg, caption] : section.figures) out += figure(svg, escaped(caption));
@@ -297,28 +306,22 @@ std::string plan_section(const PagePlan& plan) {
                     ? "Where the poses lie between the limits of each joint."
                     : "Where the poses lie between the limits of each joint; orange, a little "
                       "higher: measured already.");
-  out += figure(plot_progress(plan.progress), "The criterion of the best set so far, over the work done.");
-  out += "</div>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">pose</th>";
-  for (std::size_t j = 0; j < joint_count; ++j) out += fmt::format("<th scope=\"col\">q{} [deg]</th>", j + 1);
-  if (!plan.payload_kg.empty()) out += "<th scope=\"col\">payload [kg]</th>";
-  out += "</tr></thead><tbody>\n";
-  for (std::size_t k = 0; k < plan.q_rad.size(); ++k) {
-    out += fmt::format("<tr><th scope=\"row\">{}</th>", k + 1);
-    for (const double v : plan.q_rad[k]) out += fmt::format("<td>{:.3f}</td>", degrees(v));
-    if (!plan.payload_kg.empty()) out += fmt::format("<td>{:g}</td>", plan.payload_kg[k]);
-    out += "</tr>\n";
-  }
+  Curves progress{"Criterion of the best set of poses over the work done",
+                  "thousand evaluations",
+                  "criterion",
+                  {},
+                  false,
+                  {{"", {}, CurveStyle::steps, "", {}}}};
+  for (const auto& [work, value] : plan.progress) progress.curves[0].points.push_back({work / 1e3, value});
+  out += figure(plot_curves(progress), "The criterion of the best set so far, over the work done.");
+  out += "</div>\n" + poses_table(plan.q_rad, plan.payload_kg, 3);
   out +=
-      "</tbody></table></div></section>\n<section><h2>What to expect</h2>\n<p>One standard deviation of each "
-      "parameter that these poses make known, for the noise of the robot file.</p>\n<div "
-      "class=\"scroll\"><table "
-      "class=\"parameters\"><thead><tr><th scope=\"col\">parameter</th><th scope=\"col\">±</th><th "
-      "scope=\"col\">unit</th></tr></thead><tbody>\n";
-  for (const auto& [name, sigma] : plan.expected) {
-    out += fmt::format("<tr><th scope=\"row\">{}</th><td>{:.2g}</td><td>{}</td></tr>\n", escaped(name), sigma,
-                       unit_of_name(name));
-  }
-  return out + "</tbody></table></div></section>\n";
+      "</section>\n<section><h2>What to expect</h2>\n<p>One standard deviation of each parameter that these "
+      "poses make known, for the noise of the robot file.</p>\n";
+  std::vector<Cells> rows;
+  for (const auto& [name, sigma] : plan.expected)
+    rows.push_back({name, fmt::format("{:.2g}", sigma), unit_of_name(name)});
+  return out + table({"parameter", "±", "unit"}, rows, " class=\"parameters\"") + "</section>\n";
 }
 
 /// Only places beside this page or inside it: a report never leads into the network.
@@ -350,8 +353,8 @@ std::string html(const Page& page) {
     out += "</dl>\n";
   }
   if (page.plan) out += plan_section(*page.plan);
-  for (const PagePoses& set : page.poses) out += poses_section(set);
   for (const PageSection& section : page.sections) out += free_section(section);
+  for (const PagePoses& set : page.poses) out += poses_section(set);
   out += results_table(page);
   out += limits_of_the_data(page);
   out += parameter_table(page);

@@ -109,12 +109,16 @@ double py(double share) { return height - bottom - share * (height - top - botto
 /// The frame of a plot: title for those who do not see it, axes, what hangs on them.
 class Plot {
  public:
-  explicit Plot(const std::string& described) {
+  /// `indent`: more room on the left, for long names there.
+  explicit Plot(const std::string& described, double indent = 0) : indent_(indent) {
     svg_ = fmt::format(
         "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\" "
         "xmlns=\"http://www.w3.org/2000/svg\">\n",
         width, height, escaped(described));
   }
+
+  /// Horizontally from 0 to 1, inside this plot's frame.
+  double px(double share) const { return left + indent_ + share * (width - left - indent_ - right); }
 
   void x_axis(const std::vector<Tick>& ticks, const Scale& scale, const std::string& name) {
     for (const Tick& t : ticks) {
@@ -153,8 +157,16 @@ class Plot {
   std::string done() { return svg_ + "</svg>\n"; }
 
  private:
+  double indent_;
   std::string svg_;
 };
+
+/// Room for names on the left of the frame, beyond what numbers take.
+double longest(const std::vector<std::string>& names) {
+  std::size_t most = 0;
+  for (const std::string& name : names) most = std::max(most, name.size());
+  return std::clamp(6.0 * static_cast<double>(most) - 30, 0.0, 120.0);
+}
 
 /// A dot in a path whose lines have round ends.
 std::string dot(double x, double y) { return fmt::format("M{:.1f} {:.1f}h0", x, y); }
@@ -196,16 +208,22 @@ Scale around(double low, double high, bool log) {
 
 std::string plot_curves(const Curves& c) {
   double x_low = HUGE_VAL, x_high = -HUGE_VAL, y_low = HUGE_VAL, y_high = -HUGE_VAL;
+  const auto reach = [&](double y) {
+    if (c.log_y && !(y > 0)) return;
+    y_low = std::min(y_low, y);
+    y_high = std::max(y_high, y);
+  };
   for (const Curve& curve : c.curves) {
     for (const auto& [x, y] : curve.points) {
       if (c.log_y && !(y > 0)) continue;
       x_low = std::min(x_low, x);
       x_high = std::max(x_high, x);
-      y_low = std::min(y_low, y);
-      y_high = std::max(y_high, y);
+      reach(y);
     }
+    for (const auto& [low, high] : curve.band) reach(low), reach(high);
   }
   if (!(y_high >= y_low)) return "";
+  if (c.floor) reach(*c.floor);
   const double margin = std::max(1e-9, c.x_texts.empty() ? 0.02 * (x_high - x_low) : 0.5);
   const Scale x{x_low - margin, x_high + margin, false};
   const Scale y = around(y_low, y_high, c.log_y);
@@ -220,23 +238,64 @@ std::string plot_curves(const Curves& c) {
   plot.x_axis(ticks, x, c.x_name);
   static constexpr std::array<const char*, 6> kinds{"after", "before", "y", "x", "z", "floor"};
   for (std::size_t k = 0; k < c.curves.size() && k < kinds.size(); ++k) {
-    std::string line;
-    std::string dots;
-    for (const auto& [at, value] : c.curves[k].points) {
+    const Curve& curve = c.curves[k];
+    const std::string kind = curve.colour.empty() ? kinds[k] : curve.colour;
+    std::string line, dots, forth, back;
+    for (std::size_t n = 0; n < curve.points.size(); ++n) {
+      const auto& [at, value] = curve.points[n];
       if (c.log_y && !(value > 0)) continue;
       const double px_at = px(x.at(at));
       const double py_at = py(y.at(value));
-      line += fmt::format("{}{:.1f} {:.1f}", line.empty() ? "M" : "L", px_at, py_at);
+      line += line.empty()                       ? fmt::format("M{:.1f} {:.1f}", px_at, py_at)
+              : curve.style == CurveStyle::steps ? fmt::format("H{:.1f}V{:.1f}", px_at, py_at)
+                                                 : fmt::format("L{:.1f} {:.1f}", px_at, py_at);
       dots += dot(px_at, py_at);
+      if (n >= curve.band.size()) continue;
+      forth += fmt::format("{}{:.1f} {:.1f}", forth.empty() ? "M" : "L", px_at, py(y.at(curve.band[n][1])));
+      back.insert(0, fmt::format("L{:.1f} {:.1f}", px_at, py(y.at(curve.band[n][0]))));
     }
-    if (c.x_texts.empty()) plot.path(line, fmt::format("line {}", kinds[k]).c_str());
-    if (c.curves[k].points.size() <= 60) plot.path(dots, fmt::format("dots {}", kinds[k]).c_str());
+    if (!forth.empty()) plot.path(forth + back + "Z", fmt::format("bars {}", kind).c_str());
+    const bool joined =
+        curve.style == CurveStyle::usual ? c.x_texts.empty() : curve.style != CurveStyle::dots;
+    const bool few = curve.points.size() <= 60;
+    if (joined) plot.path(line, fmt::format("line {}", kind).c_str());
+    if (curve.style == CurveStyle::dots || (curve.style == CurveStyle::usual && few))
+      plot.path(dots, fmt::format("{} {}", few ? "dots" : "fine", kind).c_str());
     if (c.curves.size() > 1) {
       const double row = py(1) + 12 + 13 * static_cast<double>(k);
-      plot.path(dot(px(1) - 8, row - 4), fmt::format("dots {}", kinds[k]).c_str());
-      plot.text(px(1) - 16, row, "end", c.curves[k].name);
+      plot.path(dot(px(1) - 8, row - 4), fmt::format("dots {}", kind).c_str());
+      plot.text(px(1) - 16, row, "end", curve.name);
     }
   }
+  if (c.floor) plot.floor(py(y.at(*c.floor)));
+  return plot.done();
+}
+
+std::string plot_bars(const Bars& bars) {
+  double most = 0;
+  for (const auto* list : {&bars.before, &bars.after})
+    for (const double v : *list) most = std::max(most, v);
+  const double step = round_step(most > 0 ? most : 1, 5);
+  const Scale x{0, step * std::ceil((most > 0 ? most : 1) / step - 1e-9), false};
+  const auto count = static_cast<double>(std::max<std::size_t>(bars.names.size(), 1));
+  Plot plot(bars.described, longest(bars.names));
+  std::vector<Tick> names;
+  for (std::size_t k = 0; k < bars.names.size(); ++k)
+    names.push_back({count - static_cast<double>(k) - 0.5, bars.names[k]});
+  const Scale y{0, count, false};
+  plot.y_axis(names, y, "");
+  plot.x_axis(x.ticks(5), x, bars.x_name);
+  const auto draw = [&](const std::vector<double>& values, double from, double to, const char* kind) {
+    std::string d;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const double top_of = count - static_cast<double>(k);
+      d += fmt::format("M{:.1f} {:.1f}H{:.1f}V{:.1f}H{:.1f}Z", plot.px(0), py(y.at(top_of - from)),
+                       plot.px(x.at(std::max(values[k], 0.0))), py(y.at(top_of - to)), plot.px(0));
+    }
+    plot.path(d, kind);
+  };
+  draw(bars.before, 0.12, bars.after.empty() ? 0.88 : 0.5, "bars before");
+  draw(bars.after, 0.5, 0.88, "bars after");
   return plot.done();
 }
 
@@ -344,33 +403,6 @@ std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t j
     }
     plot.path(d, poses.size() > 60 ? fine[k] : kind[k]);
   }
-  return plot.done();
-}
-
-std::string plot_progress(const std::vector<std::pair<double, double>>& progress) {
-  double low = HUGE_VAL, high = 0, most = 1;
-  for (const auto& [work, value] : progress) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-    most = std::max(most, work);
-  }
-  if (progress.empty()) low = 0, high = 1;
-  const double margin = std::max(0.05 * (high - low), 1e-3 * high);
-  const Scale y{low - margin, high + margin, false};
-  const Scale x{0, most / 1e3, false};
-  Plot plot("Criterion of the best set of poses over the work done");
-  plot.y_axis(y.ticks(4), y, "criterion");
-  plot.x_axis(x.ticks(5), x, "thousand evaluations");
-  std::string d;
-  for (std::size_t k = 0; k < progress.size(); ++k) {
-    const double at = px(x.at(progress[k].first / 1e3));
-    const double up = py(y.at(progress[k].second));
-    d += k == 0 ? fmt::format("M{:.1f} {:.1f}", at, up) : fmt::format("H{:.1f}V{:.1f}", at, up);
-  }
-  if (!progress.empty()) d += fmt::format("H{:.1f}", px(1));
-  plot.path(d, "line after");
-  plot.path(progress.empty() ? "" : dot(px(x.at(progress[0].first / 1e3)), py(y.at(progress[0].second))),
-            "dots after");
   return plot.done();
 }
 

@@ -22,9 +22,19 @@ struct ErrorPairs {
   std::optional<double> floor;
 };
 
+enum class CurveStyle {
+  usual,  ///< a line, with dots where they are few; over cases dots alone
+  line,
+  dots,
+  steps  ///< each value stays until the next
+};
+
 struct Curve {
   std::string name;
   std::vector<std::array<double, 2>> points;  ///< x, y
+  CurveStyle style = CurveStyle::usual;
+  std::string colour = {};  ///< after, before, x, y, z, floor; empty: by its place in the list
+  std::vector<std::array<double, 2>> band = {};  ///< low and high beside each point, or empty
 };
 
 /// Any quantity over any other: up to six curves with their names.
@@ -36,6 +46,7 @@ struct Curves {
       x_texts;  ///< where x counts cases 0, 1, 2 …: their names; points are then not joined
   bool log_y = false;
   std::vector<Curve> curves;
+  std::optional<double> floor = {};  ///< the noise, as a line across
 };
 std::string plot_curves(const Curves& curves);
 
@@ -48,8 +59,16 @@ std::string plot_histogram(const ErrorPairs& errors);
 /// The three components of the position error that is left, against each joint's angle: what has a shape is not noise.
 std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint);
 
-/// The criterion of the best set so far over the work done.
-std::string plot_progress(const std::vector<std::pair<double, double>>& progress);
+/// Named shares between 0 and 1 as bars, one above the other, before and after.
+struct Bars {
+  std::string described;
+  std::string x_name;
+  std::vector<std::string> names;
+  std::vector<double> before;
+  std::vector<double> after;  ///< as many, or none
+};
+std::string plot_bars(const Bars& bars);
+
 /// Where the poses of a plan lie between each joint's limits; those that were measured already above them.
 std::string plot_coverage(const PagePlan& plan);
 

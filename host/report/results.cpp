@@ -7,10 +7,9 @@
 #include "report/parameters.hpp"
 
 namespace flexcomp::host {
-namespace {
 
-PagePoses poses_of(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
-                   const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers) {
+PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
+                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers) {
   PagePoses set;
   set.before = "nominal model";
   set.after = "calibrated model";
@@ -31,7 +30,7 @@ PagePoses poses_of(const std::vector<RowResidual>& before, const std::vector<Row
   return set;
 }
 
-Page page(const std::string& title, const RobotFile& robot) {
+Page titled_page(const std::string& title, const RobotFile& robot) {
   Page page;
   page.title = title;
   Calibration now;
@@ -39,6 +38,8 @@ Page page(const std::string& title, const RobotFile& robot) {
   page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
   return page;
 }
+
+namespace {
 
 std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) {
   return fmt::format("Mean position error {:.3f} mm before, {:.3f} mm after.", before.mean_m * 1e3,
@@ -49,7 +50,7 @@ std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) 
 
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
              const std::string& data) {
-  Page p = page("Identification of " + robot.name, robot);
+  Page p = titled_page("Identification of " + robot.name, robot);
   p.summary =
       gained(statistics(r.nominal, rows), r.after) + " On the poses that were fitted: validate on others.";
   p.doubts = r.doubts;
@@ -62,7 +63,7 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
              {"O1", fmt::format("{:.3g}", r.o1)},
              {"converged", r.fit.converged ? "yes" : "no"},
              {"rows outside the bulk", fmt::format("{}", r.outliers.size())}};
-  PagePoses set = poses_of(r.nominal, r.residuals, rows, r.outliers);
+  PagePoses set = page_poses(r.nominal, r.residuals, rows, r.outliers);
   set.title = "Poses that were fitted";
   p.poses.push_back(set);
   add_parameters(p, r.calibration, robot);
@@ -73,14 +74,14 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
 
 Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
              const Calibration& calibration, const std::string& data) {
-  Page p = page("Validation of " + robot.name, robot);
+  Page p = titled_page("Validation of " + robot.name, robot);
   p.summary = gained(statistics(v.nominal, rows), v.after);
   p.doubts = v.doubts;
   p.facts = {{"data", data},
              {"calibration", calibration.path},
              {"poses", fmt::format("{}", rows.size())},
              {"chi-square per degree of freedom", fmt::format("{:.3g}", v.chi2_per_dof())}};
-  PagePoses set = poses_of(v.nominal, v.residuals, rows, {});
+  PagePoses set = page_poses(v.nominal, v.residuals, rows, {});
   set.title = "Poses that were not fitted";
   p.poses.push_back(set);
   add_parameters(p, calibration, robot);

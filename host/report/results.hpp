@@ -1,11 +1,14 @@
 /// \file
-/// Pages of what `identify` and `validate` found.
+/// Pages of what `identify`, `validate` and `diagnose` found.
 #ifndef FLEXCOMP_HOST_REPORT_RESULTS_HPP
 #define FLEXCOMP_HOST_REPORT_RESULTS_HPP
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/held_out.hpp"
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
 #include "report/page.hpp"
@@ -16,6 +19,15 @@ Page page_of(const Identification& result, const std::vector<Observation>& rows,
              const std::string& data);
 Page page_of(const Validation& result, const std::vector<Observation>& rows, const RobotFile& robot,
              const Calibration& calibration, const std::string& data);
+
+/// \param others  rows that were kept out, where there are any
+Page page_of(const Diagnosis& result, const std::vector<Observation>& rows, const RobotFile& robot,
+             const std::string& data, const std::optional<HeldOut>& others);
+
+/// What pages of results have in common: a page with its title and who made it when, and the rows as poses of a page.
+Page titled_page(const std::string& title, const RobotFile& robot);
+PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
+                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers);
 
 }  // namespace flexcomp::host
 

@@ -1,0 +1,204 @@
+#include "diagnosis/diagnose.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "commands/accuracy.hpp"
+#include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "commands/diagnosis_json.hpp"
+#include "commands/progress_bar.hpp"
+#include "diagnosis/held_out.hpp"
+#include "diagnosis/words.hpp"
+#include "errors.hpp"
+#include "files/write_file.hpp"
+#include "report/results.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+struct Diagnose {
+  CommonOptions common;
+  std::string robot;
+  std::string calibration;
+  std::string data;
+  std::string holdout;
+  std::string out;
+  std::string plan;
+  std::string report;
+  bool force = false;
+
+  void run() const;
+  void say_effects(const Diagnosis& d, const RobotFile& robot_file) const;
+  void say_gap(const Diagnosis& d, const std::optional<HeldOut>& others) const;
+  bool write_plan(const Diagnosis& d, const RobotFile& robot_file) const;
+};
+
+std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
+
+void Diagnose::say_effects(const Diagnosis& d, const RobotFile& robot_file) const {
+  if (!d.effects.empty()) {
+    common.say(fmt::format("  {:<40} {:>12} {:>9} {:>8} {:>10}  {}", "effect", "largest mm", "rms mm", "p",
+                           "delta BIC", "to the controller"));
+  }
+  for (const FoundEffect& e : d.effects) {
+    common.say(fmt::format("  {:<40} {:>12.4f} {:>9.4f} {:>8} {:>10.1f}  {}", name(e.id), e.largest_m * 1e3,
+                           e.rms_m * 1e3, chance(e.p_value), e.delta_bic,
+                           e.pushed ? "yes" : "no: of the measurement"));
+    for (const std::string& line : sizes(e)) common.say("      " + line);
+    if (!e.confounded_with.empty()) common.say("      these data cannot tell it from: " + rivals_text(e));
+  }
+  for (const EffectId& id : unnamed_effects(d, robot_file)) common.say("  " + name(id) + ": " + in_words(id));
+  if (d.where) {
+    common.say(fmt::format("  where {}: {}", d.verdict == Verdict::unnamed ? "the gap is" : "it was",
+                           where_sentence(*d.where)));
+  }
+  for (const NotTestable& n : d.not_testable) common.say("  not tested: " + not_testable_text(n));
+}
+
+void Diagnose::say_gap(const Diagnosis& d, const std::optional<HeldOut>& others) const {
+  const auto line = [this](const std::string& what, const ErrorStatistics& before,
+                           const ErrorStatistics& after, double floor_m) {
+    const double gap = gap_of(before.rms_m, floor_m), left = gap_of(after.rms_m, floor_m);
+    std::string turned;
+    if (before.rms_rad && after.rms_rad)
+      turned = fmt::format("; {:.5f} -> {:.5f} deg", degrees(*before.rms_rad), degrees(*after.rms_rad));
+    common.say(fmt::format("  {:<24} {:>9.4f} {:>9.4f} {:>12.4f} {:>9.4f} -> {:.4f}{}", what,
+                           before.rms_m * 1e3, after.rms_m * 1e3, floor_m * 1e3, gap * 1e3, left * 1e3,
+                           turned));
+  };
+  common.say(fmt::format("  {:<24} {:>9} {:>9} {:>12} {:>9}", "position error, rms mm", "before", "after",
+                         "noise alone", "gap"));
+  line("fitted rows", d.error_before, d.error_after, d.noise_floor_m);
+  if (others) line("held-out rows", others->before, others->after, others->noise_floor_m);
+  common.say(fmt::format("  chi-square per degree of freedom {:.3g} before, {:.3g} after",
+                         d.chi2_per_dof_before, d.chi2_per_dof_after));
+}
+
+/// \return whether there was anything to tell apart
+bool Diagnose::write_plan(const Diagnosis& d, const RobotFile& robot_file) const {
+  if (d.telling_poses.empty()) return false;
+  DataFile poses;
+  poses.columns.payload_mass = true;
+  for (const CuringPose& p : d.telling_poses) {
+    Measurement row;
+    row.context = default_context<double>(robot_file.nominal);
+    row.q_rad = p.q_rad;
+    row.context.payload_kg = p.payload_kg;
+    poses.rows.push_back(row);
+  }
+  save_data(plan, poses);
+  return true;
+}
+
+void Diagnose::run() const {
+  const RobotFile robot_file = load_robot(robot);
+  DiagnoseOptions options;
+  if (!calibration.empty()) options.start = load_calibration(calibration, robot_file);
+  const DataFile file = load_data(data, robot_file, {force});
+  std::vector<std::string> warnings = file.warnings;
+  const std::vector<Observation> rows = observe(file, robot_file, &warnings);
+  std::vector<Observation> other_rows;
+  if (!holdout.empty()) {
+    const DataFile other = load_data(holdout, robot_file, {force});
+    refuse_the_fitted(file, other);
+    warnings.insert(warnings.end(), other.warnings.begin(), other.warnings.end());
+    other_rows = observe(other, robot_file, &warnings);
+    if (!force)
+      refuse_the_implausible(robot_file, other_rows, holdout, errors_before(robot_file, other_rows));
+    const std::vector<std::string> missing = missing_columns(file, other);
+    if (!missing.empty()) {
+      warnings.push_back(
+          fmt::format("{}: has no {}, which {} has: the held-out errors are those of the defaults", holdout,
+                      fmt::join(missing, ", "), data));
+    }
+  }
+  options.columns = file.columns;
+  options.force = force;
+  options.seed = common.seed;
+  Diagnosis d;
+  {
+    ProgressBar bar("diagnosing", common.quiet);
+    options.progress = [&bar](const std::string& what, double share) {
+      bar.show(static_cast<std::size_t>(std::lround(100 * std::min(std::max(share, 0.0), 1.0))), 100, what);
+    };
+    d = diagnose(robot_file, rows, data, options);
+  }
+  std::optional<HeldOut> others;
+  if (!holdout.empty()) others = held_out(robot_file, d, other_rows, holdout, force);
+  add_outlier_warning(warnings, data, rows, d.outliers);
+  common.warn(warnings);
+  stamp(d.after, robot_file);
+  save_calibration(out, d.after, robot_file);
+  const bool planned = !plan.empty() && write_plan(d, robot_file);
+
+  common.say(verdict_sentence(d));
+  say_effects(d, robot_file);
+  say_gap(d, others);
+  for (const std::string& note : d.notes) common.say("  note: " + note);
+  common.say(fmt::format("{}: written", out));
+  if (planned)
+    common.say(fmt::format("{}: {} poses that tell the rivals apart", plan, d.telling_poses.size()));
+  if (!plan.empty() && !planned) {
+    common.say(fmt::format("{}: not written: {}", plan,
+                           d.effects.empty() ? "nothing was found that could go by another name"
+                                             : "no two names are left that further poses would tell apart"));
+  }
+  for (const std::string& step : next_steps(d, out, planned ? plan : "")) common.say("  next: " + step);
+
+  common.write_json(to_json(d, rows, others, robot_file));
+  if (!report.empty()) {
+    write_file(report, html(page_of(d, rows, robot_file, data, others)));
+    common.say(report + ": written");
+  }
+  if (!d.doubts.empty()) throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, joined(d.doubts)));
+}
+
+}  // namespace
+
+void add_diagnose(CLI::App& app) {
+  auto options = std::make_shared<Diagnose>();
+  CLI::App* command = app.add_subcommand(
+      "diagnose", "Where model and measurement still disagree: find the missing effect, name it, add it");
+  add_robot_option(*command, options->robot);
+  command
+      ->add_option("--calibration", options->calibration,
+                   "Where to start; without it the full model is identified first")
+      ->type_name("CAL.yaml");
+  command
+      ->add_option(
+          "--data", options->data,
+          "Measured data [deg, mm], with context where it was recorded: payload_kg, move1_deg … or dir1 …, "
+          "temp_c, time_s")
+      ->type_name("D.csv")
+      ->required();
+  command
+      ->add_option("--holdout", options->holdout,
+                   "Other measured rows: how far the gap shrinks there. Changes nothing else")
+      ->type_name("H.csv");
+  command->add_option("-o,--output", options->out, "Calibration file with what was found")
+      ->type_name("CAL2.yaml")
+      ->required();
+  command
+      ->add_option("--plan", options->plan,
+                   "Where two names fit equally well: poses that would tell them apart (as plan writes them)")
+      ->type_name("POSES.csv");
+  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
+  add_force_option(*command, options->force);
+  options->common.add_seed_to(*command);
+  options->common.add_to(*command);
+  command->footer(
+      "Example:\n  flexcomp diagnose --robot tx60l.yaml --calibration cal.yaml --data measured.csv --holdout "
+      "others.csv -o cal2.yaml\n"
+      "Every verdict is exit status 0. Exit status 5: the files were written, but the error did not shrink "
+      "or "
+      "chi-square lies outside its 99.9 % interval.");
+  command->callback([options] { options->run(); });
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,173 @@
+#include "diagnosis/effect_profile.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "flexcomp/identification.hpp"
+#include "identification/residuals.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+constexpr std::size_t line_points = 181;
+
+/// What the effect follows.
+struct Follows {
+  std::string name;
+  bool cases = false;
+  bool reading = false;  ///< of `joint` (from 0): the line is drawn over all angles, not only where rows are
+  std::size_t joint = 0;
+  bool torque = false;
+};
+
+std::optional<Follows> follows(const EffectId& id) {
+  const auto angle = [](unsigned joint) {
+    return Follows{fmt::format("q{} [deg]", joint), false, true, joint - 1U, false};
+  };
+  switch (id.effect) {
+    case Effect::joint_curve:
+      if (id.factor != Factor::one) return std::nullopt;  // a function of two things
+      return angle(id.joint);
+    case Effect::gear_harmonic:
+    case Effect::encoder_scale:
+      return angle(id.joint);
+    case Effect::joint_coupling:
+      return angle(id.from);
+    case Effect::backlash:
+      return Follows{fmt::format("direction of joint {} before the pose", id.joint), true, false,
+                     id.joint - 1U, false};
+    case Effect::readout_lag:
+      return Follows{fmt::format("relative speed of joint {}", id.joint), false, false, id.joint - 1U, false};
+    case Effect::joint_compliance:
+    case Effect::nonlinear_compliance:
+      return Follows{fmt::format("load torque on joint {} [N m]", id.joint), false, false, id.joint - 1U,
+                     true};
+    default:
+      return std::nullopt;
+  }
+}
+
+double x_of(const Follows& f, const EffectId& id, const HostModel& model, const Observation& row) {
+  if (f.reading) return degrees(row.q_rad[f.joint]);
+  if (id.effect == Effect::backlash) return row.context.direction[f.joint];
+  if (id.effect == Effect::readout_lag) return row.context.relative_speed[f.joint];
+  Linearisation<double, joint_count> at;
+  linearise(model, row.q_rad, row.context, at);
+  return detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(f.joint, 2),
+                                      at.unloaded.frames.origin[f.joint]);
+}
+
+/// A turn of the joint that follows nothing: cos(0 q). No constant of the chain, or loads would be taken elsewhere.
+Parameter add_turn(TermSet& set, Place place) {
+  Term<double> t;
+  t.place = place;
+  t.basis = Basis::cosine;
+  t.joint = static_cast<std::uint8_t>(place.body - 1U);
+  t.effect = Effect::gear_harmonic;
+  t.instance = next_instance(set);
+  t.argument = 0;
+  t.coefficient = 0;
+  set.terms.push_back(t);
+  return {"turn", unit::si, {set.terms.size() - 1}, {}};
+}
+
+/// The part of `column` along `turn` at row k, per unit of the turn.
+double along(const Eigen::VectorXd& column, const Eigen::VectorXd& turn, Eigen::Index k) {
+  const auto t = turn.segment<6>(6 * k);
+  const double square = t.squaredNorm();
+  return square > 0 ? t.dot(column.segment<6>(6 * k)) / square : 0.0;
+}
+
+}  // namespace
+
+std::optional<EffectProfile> profile_of(const RobotFile& robot, const Calibration& calibration,
+                                        const EffectId& id, const std::vector<Observation>& rows) {
+  const auto what = follows(id);
+  if (!what || rows.empty()) return std::nullopt;
+  const auto groups = effects_of(calibration.terms, robot.nominal);
+  const auto group = std::find_if(groups.begin(), groups.end(),
+                                  [&](const EffectGroup& g) { return name(g.id) == name(id); });
+  if (group == groups.end()) return std::nullopt;
+
+  Estimate with;
+  with.set = calibration.terms;
+  with.f = calibration.f();
+  with.e = calibration.e();
+  Unknowns unknowns;
+  unknowns.parameters.push_back(add_turn(with.set, {static_cast<std::uint8_t>(id.joint), slot::theta}));
+  unknowns.parameters.insert(unknowns.parameters.end(), group->parameters.begin(), group->parameters.end());
+  Estimate without = with;
+  for (const Parameter& p : group->parameters) p.set(without.set, 0);
+  const auto model = prepare(with.set, robot, calibration.path);
+  const auto bare = prepare(without.set, robot, calibration.path);
+  const Eigen::VectorXd units = units_of(unknowns, with.set);
+
+  EffectProfile out;
+  out.x_name = what->name;
+  out.cases = what->cases;
+  const Linearised now = linearised(with, *model, rows, unknowns);
+  const Linearised then = linearised(without, *bare, rows, {{}, {unknowns.parameters.front()}, {}});
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    ProfileRow r;
+    r.x = x_of(*what, id, *model, rows[k]);
+    r.without_rad = along(then.residual, then.derivative.col(0), i) * units[0];
+    r.left_rad = along(now.residual, now.derivative.col(0), i) * units[0];
+    const double stiffness = now.derivative.col(0).segment<6>(6 * i).norm();
+    if (!(stiffness > 0)) continue;
+    r.sigma_rad = units[0] / stiffness;
+    out.rows.push_back(r);
+  }
+
+  // The line: over all angles that were measured, or where the rows are.
+  std::vector<Observation> places = rows;
+  if (what->reading) {
+    const auto [low, high] = std::minmax_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) {
+      return a.q_rad[what->joint] < b.q_rad[what->joint];
+    });
+    const double from = low->q_rad[what->joint], to = high->q_rad[what->joint];
+    places.assign(line_points, rows.front());
+    for (std::size_t k = 0; k < line_points; ++k) {
+      places[k].q_rad[what->joint] = from + (to - from) * static_cast<double>(k) / (line_points - 1);
+    }
+  } else if (what->cases) {
+    places.assign(2, rows.front());
+    places[0].context.direction[what->joint] = -1;
+    places[1].context.direction[what->joint] = 1;
+  }
+  // How the value depends on each number of the effect, read off the model's own derivatives.
+  Eigen::MatrixXd covariance;
+  if (calibration.covariance) {
+    const auto& known = calibration.covariance->parameters;
+    Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(group->parameters.size()),
+                                                   calibration.covariance->factor.cols());
+    for (std::size_t p = 0; p < group->parameters.size(); ++p) {
+      const auto at = std::find(known.begin(), known.end(), group->parameters[p].name);
+      if (at != known.end())
+        factor.row(static_cast<Eigen::Index>(p)) = calibration.covariance->factor.row(at - known.begin());
+    }
+    covariance = factor * factor.transpose();
+  }
+  const Linearised drawn = linearised(with, *model, places, unknowns);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    Eigen::VectorXd slope(static_cast<Eigen::Index>(group->parameters.size()));
+    ProfilePoint point;
+    point.x = x_of(*what, id, *model, places[k]);
+    for (Eigen::Index p = 0; p < slope.size(); ++p) {
+      slope[p] = along(drawn.derivative.col(p + 1), drawn.derivative.col(0), i) * units[0] / units[p + 1];
+      point.value_rad += slope[p] * group->parameters[static_cast<std::size_t>(p)].get(with.set);
+    }
+    if (covariance.size() > 0) point.sigma_rad = std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+    out.line.push_back(point);
+  }
+  std::sort(out.line.begin(), out.line.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
+  return out;
+}
+
+}  // namespace flexcomp::host

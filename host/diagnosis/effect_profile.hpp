@@ -1,0 +1,44 @@
+/// \file
+/// An effect as a curve, and what the rows say of it: the numbers behind its drawing.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_EFFECT_PROFILE_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_EFFECT_PROFILE_HPP
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "catalogue/catalogue.hpp"
+#include "files/calibration_file.hpp"
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+
+struct ProfilePoint {
+  double x = 0;          ///< of EffectProfile::x_name
+  double value_rad = 0;  ///< by which the effect turns its joint
+  double sigma_rad = 0;  ///< from the calibration's covariance; 0 where it has none
+};
+
+/// What one row says of the joint's turn, carried back from the tool: weighted least squares on the joint's screw.
+struct ProfileRow {
+  double x = 0;
+  double without_rad = 0;  ///< with everything else of the model in place, this effect taken out
+  double left_rad = 0;     ///< with it
+  double sigma_rad = 0;    ///< of both, by the noise of the row
+};
+
+struct EffectProfile {
+  std::string x_name;  ///< with its unit
+  bool cases = false;  ///< x is -1, 0 or 1
+  std::vector<ProfilePoint> line;
+  std::vector<ProfileRow> rows;
+};
+
+/// Of an effect that turns one joint and follows one quantity; nothing where it is of another kind, or not in the
+/// calibration.
+std::optional<EffectProfile> profile_of(const RobotFile& robot, const Calibration& calibration,
+                                        const EffectId& id, const std::vector<Observation>& rows);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,91 @@
+#include "diagnosis/held_out.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <system_error>
+
+#include "files/input_error.hpp"
+#include "identification/validate.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+constexpr double suspicious_factor = 100;
+
+/// Everything that was read off instruments at a row: two rows that agree in all of it are one measurement.
+std::array<double, 25> readings(const Measurement& m) {
+  std::array<double, 25> all{};
+  auto at = std::copy(m.q_rad.begin(), m.q_rad.end(), all.begin());
+  at = std::copy(m.position_m.begin(), m.position_m.end(), at);
+  const auto& orientation = m.orientation.coeffs();
+  at = std::copy(orientation.begin(), orientation.end(), at);
+  for (const Eigen::Vector3d& p : m.reflector_m) at = std::copy(p.begin(), p.end(), at);
+  return all;
+}
+
+}  // namespace
+
+double noise_floor_m(const std::vector<Observation>& rows) {
+  double sum = 0;
+  for (const Observation& row : rows) {
+    if (row.has_orientation) {
+      const Matrix6d root = row.whitening.inverse();
+      sum += (root * root.transpose()).topLeftCorner<3, 3>().trace();
+    } else {
+      const Eigen::Matrix3d root = row.whitening.topLeftCorner<3, 3>().inverse();
+      sum += (root * root.transpose()).trace();
+    }
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(rows.size(), 1)));
+}
+
+HeldOut held_out(const RobotFile& robot, const Diagnosis& d, const std::vector<Observation>& rows,
+                 const std::string& source, bool force) {
+  HeldOut out;
+  out.rows = rows.size();
+  out.before = statistics(residuals_with(robot, d.before, rows), rows);
+  out.after = statistics(residuals_with(robot, d.after, rows), rows);
+  out.noise_floor_m = noise_floor_m(rows);
+  const double usual = std::max(d.error_before.rms_m, out.noise_floor_m);
+  if (!force && out.before.rms_m > suspicious_factor * usual) {
+    throw InputError(
+        source, 0, "x_mm y_mm z_mm",
+        fmt::format("rows in the same measurement frame as those that were fitted ({:.3g} mm off, rms)",
+                    d.error_before.rms_m * 1e3),
+        fmt::format("{:.1f} mm (rms): was the instrument moved? --force goes on all the same",
+                    out.before.rms_m * 1e3));
+  }
+  return out;
+}
+
+void refuse_the_fitted(const DataFile& fitted, const DataFile& other) {
+  const char* const expected = "poses that were not fitted: held-out rows must not be those of --data";
+  std::error_code unknown;
+  if (fitted.path == other.path || std::filesystem::equivalent(fitted.path, other.path, unknown))
+    throw InputError(other.path, 0, "--holdout", expected, "the same file");
+  std::map<std::array<double, 25>, std::size_t> lines;
+  for (const Measurement& m : fitted.rows) lines.emplace(readings(m), m.line);
+  for (const Measurement& m : other.rows) {
+    const auto same = lines.find(readings(m));
+    if (same != lines.end())
+      throw InputError(other.path, m.line, "--holdout", expected,
+                       fmt::format("the measurement of {}:{}", fitted.path, same->second));
+  }
+}
+
+std::vector<std::string> missing_columns(const DataFile& fitted, const DataFile& other) {
+  const std::vector<std::string> have = joint_and_context_names(other.columns);
+  std::vector<std::string> missing;
+  for (const std::string& name : joint_and_context_names(fitted.columns)) {
+    if (std::find(have.begin(), have.end(), name) == have.end()) missing.push_back(name);
+  }
+  return missing;
+}
+
+}  // namespace flexcomp::host

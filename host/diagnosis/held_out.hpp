@@ -1,0 +1,38 @@
+/// \file
+/// Rows that were kept out of a diagnosis: whether the gap shrinks there too.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_HELD_OUT_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_HELD_OUT_HPP
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/diagnose.hpp"
+#include "files/data_file.hpp"
+
+namespace flexcomp::host {
+
+struct HeldOut {
+  std::size_t rows = 0;
+  ErrorStatistics before;    ///< with Diagnosis::before, in its frames
+  ErrorStatistics after;     ///< with Diagnosis::after
+  double noise_floor_m = 0;  ///< of these rows
+};
+
+/// sqrt(mean over rows of the trace of the position's covariance), m.
+double noise_floor_m(const std::vector<Observation>& rows);
+
+/// Errors of rows that were not fitted.
+/// \param force  go on where they look like another instrument frame
+/// \throws InputError  rows that are off by 100 times what the fitted ones are: measured in another frame
+HeldOut held_out(const RobotFile& robot, const Diagnosis& d, const std::vector<Observation>& rows,
+                 const std::string& source, bool force);
+
+/// \throws InputError  the same file, or a row of `other` that is one of `fitted`: what was fitted proves nothing
+void refuse_the_fitted(const DataFile& fitted, const DataFile& other);
+
+/// Context columns that the fitted data have and these do not: there the robot file's defaults stand.
+std::vector<std::string> missing_columns(const DataFile& fitted, const DataFile& other);
+
+}  // namespace flexcomp::host
+
+#endif

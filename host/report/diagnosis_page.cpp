@@ -1,0 +1,253 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/effect_profile.hpp"
+#include "diagnosis/words.hpp"
+#include "report/parameters.hpp"
+#include "report/plots.hpp"
+#include "report/results.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+constexpr double arcsec = pi / (180.0 * 3600.0);
+constexpr std::size_t shown_places = 10;
+
+std::string mm(double metres) { return fmt::format("{:.4f}", metres * 1e3); }
+std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
+
+/// From the model at the start to the last one, and the same on rows that nobody fitted.
+PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) {
+  PageSection section;
+  section.title = "How the gap shrinks";
+  section.paragraphs = {fmt::format(
+      "Position error (rms) {} mm before and {} mm after on the fitted rows; noise alone would give {} mm. "
+      "The gap, "
+      "noise taken away: {} mm before, {} mm after.",
+      mm(d.error_before.rms_m), mm(d.error_after.rms_m), mm(d.noise_floor_m),
+      mm(gap_of(d.error_before.rms_m, d.noise_floor_m)), mm(gap_of(d.error_after.rms_m, d.noise_floor_m)))};
+  Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]", {}, false, {}};
+  if (d.noise_floor_m > 0) curves.floor = d.noise_floor_m * 1e3;
+  section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "on left-out poses"};
+  Curve fitted{"fitted rows", {}, CurveStyle::usual, "before", {}};
+  for (std::size_t k = 0; k < d.steps.size(); ++k) {
+    const DiagnosisStep& s = d.steps[k];
+    fitted.points.push_back({static_cast<double>(k), s.train_rms_m * 1e3});
+    section.rows.push_back({fmt::format("{}", k), s.what, mm(s.train_rms_m),
+                            fmt::format("{:.3g}", s.chi2_per_dof), fmt::format("{:.3g}", s.cross_validated)});
+  }
+  if (fitted.points.size() < 2)
+    fitted.points = {{0, d.error_before.rms_m * 1e3}, {1, d.error_after.rms_m * 1e3}};
+  const double last = fitted.points.back()[0];
+  curves.curves.push_back(fitted);
+  if (others) {
+    curves.curves.push_back({"held-out rows, first and last",
+                             {{0, others->before.rms_m * 1e3}, {last, others->after.rms_m * 1e3}},
+                             CurveStyle::dots,
+                             "after",
+                             {}});
+    section.paragraphs.push_back(fmt::format(
+        "On {} rows that were not fitted: {} mm before, {} mm after; the gap {} mm before, {} mm after.",
+        others->rows, mm(others->before.rms_m), mm(others->after.rms_m),
+        mm(gap_of(others->before.rms_m, others->noise_floor_m)),
+        mm(gap_of(others->after.rms_m, others->noise_floor_m))));
+  }
+  const std::string caption =
+      "Root mean square of the 3-D position error at the start and after each step below.";
+  section.figures.emplace_back(plot_curves(curves), caption);
+  return section;
+}
+
+PageSection place(const Diagnosis& d) {
+  PageSection section;
+  section.title = "Where";
+  if (d.where) {
+    const std::string text = where_sentence(*d.where);
+    section.paragraphs.push_back(
+        (d.verdict == Verdict::unnamed ? "The gap that is left is " : "The gap was ") + text + ".");
+  }
+  section.paragraphs.emplace_back(
+      "How much of what disagrees a free motion of one place alone could explain, beyond what it would "
+      "explain of "
+      "noise. Neighbours share: an arm's places move the tool in similar ways.");
+  Bars bars{
+      "Share of the misfit that each place explains, before and after", "share of the misfit", {}, {}, {}};
+  for (const PlaceShare& p : d.places) {
+    if (bars.names.size() == shown_places) break;
+    bars.names.push_back(place_name(p.place));
+    bars.before.push_back(p.explains);
+    const auto left = std::find_if(d.places_left.begin(), d.places_left.end(),
+                                   [&](const PlaceShare& l) { return l.place == p.place; });
+    if (!d.places_left.empty()) bars.after.push_back(left == d.places_left.end() ? 0 : left->explains);
+  }
+  if (!bars.names.empty())
+    section.figures.emplace_back(plot_bars(bars),
+                                 "Orange: the model at the start. Blue: with what was found.");
+  return section;
+}
+
+/// The effect with its band, and the rows that speak of it.
+std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile& profile,
+                                                            const std::string& title) {
+  // A row that sees the joint from near its axis says nothing of it, and would set the scale.
+  std::vector<double> sigmas;
+  for (const ProfileRow& r : profile.rows) sigmas.push_back(r.sigma_rad);
+  double enough = 0;
+  if (!sigmas.empty()) {
+    std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2),
+                     sigmas.end());
+    enough = 3 * sigmas[sigmas.size() / 2];
+  }
+  Curve line{"effect, 95 %", {}, profile.cases ? CurveStyle::usual : CurveStyle::line, "z", {}};
+  Curve without{"rows without it", {}, CurveStyle::dots, "before", {}};
+  Curve left{"rows, what is left", {}, CurveStyle::dots, "after", {}};
+  line.colour = "x";
+  for (const ProfilePoint& p : profile.line) {
+    line.points.push_back({p.x, p.value_rad / arcsec});
+    line.band.push_back(
+        {(p.value_rad - 1.96 * p.sigma_rad) / arcsec, (p.value_rad + 1.96 * p.sigma_rad) / arcsec});
+  }
+  for (const ProfileRow& r : profile.rows) {
+    if (r.sigma_rad > enough) continue;
+    without.points.push_back({r.x, r.without_rad / arcsec});
+    left.points.push_back({r.x, r.left_rad / arcsec});
+  }
+  Curves seen{title, profile.x_name, "arcsec", {}, false, {without, line}};
+  Curves remains{title + ": what is left", profile.x_name, "arcsec", {}, false, {left}};
+  return {{plot_curves(seen),
+           title + ": by how much the joint turns otherwise. Dots: what each row says, with this effect "
+                   "alone taken out of the model; line: the effect with its 95 % band."},
+          {plot_curves(remains),
+           title + ": what each row says with the effect in the model. Noise has no shape."}};
+}
+
+/// An effect without a name as curves over its first covariate, one per node of the second.
+std::pair<std::string, std::string> unnamed_figure(const Calibration& set, const EffectGroup& group) {
+  const EffectId& id = group.id;
+  const Unit unit = place_unit(id.place).name == "mm" ? unit::mm : unit::si;
+  const bool length = unit.name == "mm";
+  Curves curves{
+      name(id), covariate_name(id.covariate[0], id.covariate_joint[0]), length ? "mm" : "arcsec", {}, false,
+      {}};
+  const std::size_t columns = id.node[1].size();
+  const std::size_t step = std::max<std::size_t>(1, (columns + 4) / 5);
+  const auto shown = [](Covariate c, double v) { return c == Covariate::reading ? degrees(v) : v; };
+  for (std::size_t c = 0; c < columns; c += step) {
+    Curve curve;
+    curve.name = fmt::format("{} = {:.4g}", covariate_name(id.covariate[1], id.covariate_joint[1]),
+                             shown(id.covariate[1], id.node[1][c]));
+    for (std::size_t r = 0; r < id.node[0].size(); ++r) {
+      const double v = group.parameters[r * columns + c].get(set.terms);
+      curve.points.push_back({shown(id.covariate[0], id.node[0][r]), length ? v * 1e3 : v / arcsec});
+    }
+    curves.curves.push_back(curve);
+  }
+  return {plot_curves(curves), fmt::format("{}: {}.", place_name(id.place), in_words(id))};
+}
+
+PageSection effects_section(const Diagnosis& d, const RobotFile& robot,
+                            const std::vector<Observation>& rows) {
+  PageSection section;
+  section.title = "What was found";
+  section.columns = {"effect",    "largest [mm]",      "rms [mm]",           "p",
+                     "delta BIC", "to the controller", "cannot be told from"};
+  for (const FoundEffect& e : d.effects) {
+    section.rows.push_back({name(e.id), mm(e.largest_m), mm(e.rms_m), chance(e.p_value),
+                            fmt::format("{:.1f}", e.delta_bic), e.pushed ? "yes" : "no", rivals_text(e)});
+    std::string text = name(e.id) + ": " + in_words(e.id) + ".";
+    for (const std::string& line : sizes(e)) text += " " + line + ".";
+    section.paragraphs.push_back(text);
+    if (const auto profile = profile_of(robot, d.after, e.id, rows)) {
+      for (auto& figure : figures_of(*profile, name(e.id))) section.figures.push_back(std::move(figure));
+    }
+  }
+  for (const EffectGroup& group : effects_of(d.after.terms, robot.nominal)) {
+    if (group.id.effect != Effect::unnamed) continue;
+    section.paragraphs.push_back(
+        name(group.id) + ": " + in_words(group.id) +
+        ". It is described so that the error still shrinks; nobody has understood it.");
+    section.figures.push_back(unnamed_figure(d.after, group));
+  }
+  if (d.effects.empty()) {
+    section.columns.clear();
+    if (section.paragraphs.empty()) section.paragraphs.emplace_back("No effect of the catalogue.");
+  }
+  return section;
+}
+
+PageSection open_section(const Diagnosis& d) {
+  PageSection section;
+  section.title = "What these data could not be asked";
+  if (!d.not_testable.empty()) section.columns = {"effect", "what it needs"};
+  for (const NotTestable& n : d.not_testable) {
+    const std::string text = not_testable_text(n);
+    const std::string effect = effect_name(n.effect);
+    section.rows.push_back({effect, text.substr(std::min(text.size(), effect.size() + 7))});
+  }
+  if (!d.dropped.empty()) {
+    std::vector<std::string> names;
+    for (const EffectId& id : d.dropped) names.push_back(name(id));
+    section.paragraphs.push_back(fmt::format(
+        "Carried by geometry and frames already, whatever the data say: {}.", fmt::join(names, ", ")));
+  }
+  for (const std::string& note : d.notes) section.paragraphs.push_back(note);
+  return section;
+}
+
+PageSection telling_section(const Diagnosis& d) {
+  PageSection section;
+  section.title = "Poses that would tell the rivals apart";
+  section.columns = {"pose"};
+  for (std::size_t j = 0; j < joint_count; ++j) section.columns.push_back(fmt::format("q{} [deg]", j + 1));
+  section.columns.emplace_back("payload [kg]");
+  for (std::size_t k = 0; k < d.telling_poses.size(); ++k) {
+    std::vector<std::string> row{fmt::format("{}", k + 1)};
+    for (const double q : d.telling_poses[k].q_rad) row.push_back(fmt::format("{:.2f}", degrees(q)));
+    row.push_back(fmt::format("{:g}", d.telling_poses[k].payload_kg));
+    section.rows.push_back(row);
+  }
+  return section;
+}
+
+}  // namespace
+
+Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const RobotFile& robot,
+             const std::string& data, const std::optional<HeldOut>& others) {
+  Page p = titled_page("Diagnosis of " + robot.name, robot);
+  p.summary = verdict_sentence(d);
+  p.doubts = d.doubts;
+  p.facts = {
+      {"data", data},
+      {"poses", fmt::format("{}", rows.size())},
+      {"chi-square per degree of freedom",
+       fmt::format("{:.3g} → {:.3g}", d.chi2_per_dof_before, d.chi2_per_dof_after)},
+      {"gap, fitted rows [mm]", fmt::format("{} → {}", mm(gap_of(d.error_before.rms_m, d.noise_floor_m)),
+                                            mm(gap_of(d.error_after.rms_m, d.noise_floor_m)))},
+      {"rows outside the bulk", fmt::format("{}", d.outliers.size())}};
+  if (others) {
+    p.facts.push_back({"gap, held-out rows [mm]",
+                       fmt::format("{} → {}", mm(gap_of(others->before.rms_m, others->noise_floor_m)),
+                                   mm(gap_of(others->after.rms_m, others->noise_floor_m)))});
+  }
+  p.sections.push_back(shrinking(d, others));
+  p.sections.push_back(place(d));
+  p.sections.push_back(effects_section(d, robot, rows));
+  if (!d.not_testable.empty() || !d.dropped.empty() || !d.notes.empty())
+    p.sections.push_back(open_section(d));
+  if (!d.telling_poses.empty()) p.sections.push_back(telling_section(d));
+  if (d.residuals_before.size() == rows.size() && d.residuals_after.size() == rows.size()) {
+    PagePoses set = page_poses(d.residuals_before, d.residuals_after, rows, d.outliers);
+    set.title = "Poses that were fitted";
+    set.before = "the model at the start";
+    set.after = "with what was found";
+    if (d.noise_floor_m > 0) set.noise_floor_m = d.noise_floor_m;
+    p.poses.push_back(set);
+  }
+  add_parameters(p, d.after, robot);
+  return p;
+}
+
+}  // namespace flexcomp::host
