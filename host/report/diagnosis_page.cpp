@@ -31,8 +31,9 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
       mm(gap_of(d.error_before.rms_m, d.noise_floor_m)), mm(gap_of(d.error_after.rms_m, d.noise_floor_m)))};
   Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]", {}, false, {}};
   if (d.noise_floor_m > 0) curves.floor = d.noise_floor_m * 1e3;
-  section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "on left-out poses"};
-  Curve fitted{"fitted rows", {}, CurveStyle::usual, "before", {}};
+  if (!d.steps.empty())
+    section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "on left-out poses"};
+  Curve fitted{"fitted rows", {}, CurveStyle::joined, "before", {}};
   for (std::size_t k = 0; k < d.steps.size(); ++k) {
     const DiagnosisStep& s = d.steps[k];
     fitted.points.push_back({static_cast<double>(k), s.train_rms_m * 1e3});
@@ -42,6 +43,7 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
   if (fitted.points.size() < 2)
     fitted.points = {{0, d.error_before.rms_m * 1e3}, {1, d.error_after.rms_m * 1e3}};
   const double last = fitted.points.back()[0];
+  for (std::size_t k = 0; k < fitted.points.size(); ++k) curves.x_texts.push_back(fmt::format("{}", k));
   curves.curves.push_back(fitted);
   if (others) {
     curves.curves.push_back({"held-out rows, first and last",

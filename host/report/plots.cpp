@@ -201,7 +201,8 @@ Scale around(double low, double high, bool log) {
     return {low, high > low ? high : 10 * low, true};
   }
   const double step = round_step(std::max(high - low, 1e-12 + 0.02 * std::abs(high)), 5);
-  return {step * std::floor(low / step + 1e-9), step * std::ceil(high / step - 1e-9), false};
+  const double from = step * std::floor(low / step + 1e-9), to = step * std::ceil(high / step - 1e-9);
+  return {from, to > from ? to : from + step, false};
 }
 
 }  // namespace
@@ -255,11 +256,12 @@ std::string plot_curves(const Curves& c) {
       back.insert(0, fmt::format("L{:.1f} {:.1f}", px_at, py(y.at(curve.band[n][0]))));
     }
     if (!forth.empty()) plot.path(forth + back + "Z", fmt::format("bars {}", kind).c_str());
+    const bool with_dots = curve.style == CurveStyle::usual || curve.style == CurveStyle::joined;
     const bool joined =
         curve.style == CurveStyle::usual ? c.x_texts.empty() : curve.style != CurveStyle::dots;
     const bool few = curve.points.size() <= 60;
     if (joined) plot.path(line, fmt::format("line {}", kind).c_str());
-    if (curve.style == CurveStyle::dots || (curve.style == CurveStyle::usual && few))
+    if (curve.style == CurveStyle::dots || (with_dots && few))
       plot.path(dots, fmt::format("{} {}", few ? "dots" : "fine", kind).c_str());
     if (c.curves.size() > 1) {
       const double row = py(1) + 12 + 13 * static_cast<double>(k);

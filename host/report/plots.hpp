@@ -23,7 +23,8 @@ struct ErrorPairs {
 };
 
 enum class CurveStyle {
-  usual,  ///< a line, with dots where they are few; over cases dots alone
+  usual,   ///< a line, with dots where they are few; over cases dots alone
+  joined,  ///< the same, and a line over cases too
   line,
   dots,
   steps  ///< each value stays until the next

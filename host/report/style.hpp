@@ -50,6 +50,7 @@ path { fill: none; stroke-width: 1; } .grid { stroke: var(--grid); } .axis { str
 .fine { stroke-width: 2; stroke-linecap: round; stroke-opacity: .7; }
 path.before { stroke: var(--before); } path.after { stroke: var(--after); }
 .bars { fill-opacity: .35; } .bars.before { fill: var(--before); } .bars.after { fill: var(--after); }
+.bars.x { fill: var(--x); fill-opacity: .2; stroke: none; }
 path.x { stroke: var(--x); } path.y { stroke: var(--y); } path.z { stroke: var(--z); }
 .key { color: var(--soft); font-size: .9rem; }
 .mark { display: inline-block; width: .7em; height: .7em; border-radius: 50%; }
