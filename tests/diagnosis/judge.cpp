@@ -73,10 +73,9 @@ bool needs_what_is_missing(Effect kind, hidden::Roughness roughness) {
 bool as_good_as_it_can(const hidden::Case& c, const Diagnosis& d, const Oracle& oracle) {
   for (const Hidden& h : oracle.hidden) {
     if (needs_what_is_missing(h.id.effect, c.roughness)) {
-      const bool told =
-          std::any_of(d.not_testable.begin(), d.not_testable.end(), [&](const NotTestable& n) {
-            return n.effect == h.id.effect && !n.needs.empty();
-          });
+      const bool told = std::any_of(d.not_testable.begin(), d.not_testable.end(), [&](const NotTestable& n) {
+        return n.effect == h.id.effect && !n.needs.empty();
+      });
       if (!told) return false;
     } else if (h.decidable() && !finds(d, h.id)) {
       return false;

@@ -10,10 +10,10 @@
 namespace judging {
 
 using namespace flexcomp::host;
-using flexcomp::Effect;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using flexcomp::Effect;
 
 namespace {
 
@@ -81,13 +81,6 @@ double bic_gain(const Candidate& candidate, const Span& span, const VectorXd& le
   return rank == 0 ? 0 : gain - (static_cast<double>(rank) + candidate.further_parameters) * log_n;
 }
 
-MatrixXd columns_of(const MatrixXd& all, const std::vector<std::size_t>& which) {
-  MatrixXd out(all.rows(), static_cast<Index>(which.size()));
-  for (std::size_t k = 0; k < which.size(); ++k)
-    out.col(static_cast<Index>(k)) = all.col(static_cast<Index>(which[k]));
-  return out;
-}
-
 double pivot_of(const hidden::Case& c) {
   for (const hidden::Effect& e : c.hidden) {
     if (e.id.effect == Effect::base_compliance) return e.id.pivot_z_m;
@@ -145,7 +138,8 @@ std::vector<Candidate> candidates_of(const hidden::Case& c, const Estimate& at,
       slip.id.after_s = times[t];
       slip.further_parameters = 1;
       for (std::size_t n = 0; n < rows.size(); ++n) {
-        if (rows[n].context.time_s < times[t]) slip.columns.middleRows(6 * static_cast<Index>(n), 6).setZero();
+        if (rows[n].context.time_s < times[t])
+          slip.columns.middleRows(6 * static_cast<Index>(n), 6).setZero();
       }
       out.push_back(std::move(slip));
     }
@@ -159,6 +153,147 @@ struct Group {
   EffectId id;
   std::vector<std::size_t> parameters;  ///< of the oracle's fit
 };
+
+/// A model with its fit: every row counts in full.
+struct Fitted {
+  Estimate estimate;
+  Unknowns unknowns;
+  double chi2 = 0;
+  double bic = 0;
+  bool converged = false;
+};
+
+Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
+              const RobotFile& robot) {
+  Fitted out;
+  out.unknowns = unknowns;
+  out.unknowns.prior = prior_knowledge(start.set, unknowns.parameters, true, {});
+  EstimatorOptions plain_squares;
+  plain_squares.robust = false;
+  const Fit result = fit(start, out.unknowns, rows, robot, plain_squares);
+  out.estimate = result.estimate;
+  out.chi2 = result.chi2;
+  out.converged = result.converged;
+  out.bic = out.chi2 + static_cast<double>(unknowns.count()) * std::log(measured_numbers(rows));
+  return out;
+}
+
+/// Parameters from `first` on that the earlier columns do not carry; the others are set to zero and left out.
+Unknowns independent(Estimate& start, const Unknowns& all, std::size_t first,
+                     const std::vector<Observation>& rows, const RobotFile& robot) {
+  const auto model = prepare(start.set, robot, "oracle");
+  const MatrixXd columns = linearised(start, *model, rows, all).derivative;
+  Span span(columns.rows());
+  span.add(columns.leftCols(static_cast<Index>(all.frames.size() + first)));
+  Unknowns kept;
+  kept.frames = all.frames;
+  for (std::size_t p = 0; p < all.parameters.size(); ++p) {
+    if (p >= first) {
+      const Index rank = span.basis().cols();
+      span.add(columns.col(static_cast<Index>(all.frames.size() + p)));
+      if (span.basis().cols() == rank) {
+        all.parameters[p].set(start.set, 0);
+        continue;
+      }
+    }
+    kept.parameters.push_back(all.parameters[p]);
+  }
+  return kept;
+}
+
+/// A candidate with its gain in the linearised model, compliances allowed below zero: it may do worse, not better.
+struct Promise {
+  const Candidate* candidate = nullptr;
+  double bic = 0;
+};
+
+/// The best of the other names beside `rest`, by the fit itself.
+void find_rival(const hidden::Case& c, const Fitted& rest, const std::vector<Observation>& rows,
+                const std::vector<Group>& groups, double& best, std::string& name_of_best) {
+  const auto model = prepare(rest.estimate.set, c.robot, "oracle");
+  const Linearised lin = linearised(rest.estimate, *model, rows, rest.unknowns);
+  Span span(lin.residual.size());
+  span.add(lin.derivative);
+  const VectorXd left = lin.residual - span.basis() * (span.basis().transpose() * lin.residual);
+  const double log_n = std::log(measured_numbers(rows));
+  const double without = left.squaredNorm() + static_cast<double>(rest.unknowns.count()) * log_n;
+  const std::vector<Candidate> candidates = candidates_of(c, rest.estimate, rows);
+  std::vector<Promise> promises;
+  for (const Candidate& candidate : candidates) {
+    const bool true_name = std::any_of(groups.begin(), groups.end(),
+                                       [&](const Group& g) { return same_name(g.id, candidate.id); });
+    if (!true_name) promises.push_back({&candidate, without - bic_gain(candidate, span, left, log_n)});
+  }
+  std::sort(promises.begin(), promises.end(),
+            [](const Promise& a, const Promise& b) { return a.bic < b.bic; });
+  constexpr std::size_t most_fits = 10;
+  for (std::size_t k = 0; k < std::min(most_fits, promises.size()) && promises[k].bic < best; ++k) {
+    const Candidate& candidate = *promises[k].candidate;
+    ParametricModel with{rest.estimate.set, rest.unknowns.parameters};
+    const std::size_t first = with.parameters.size();
+    add_effect(with, candidate.id, c.robot.nominal);
+    Estimate start = rest.estimate;
+    start.set = with.set;
+    Unknowns all;
+    all.frames = rest.unknowns.frames;
+    all.parameters = with.parameters;
+    const Unknowns unknowns = independent(start, all, first, rows, c.robot);
+    const double bic = fitted(start, unknowns, rows, c.robot).bic + candidate.further_parameters * log_n;
+    if (bic >= best) continue;
+    best = bic;
+    name_of_best = name(candidate.id);
+  }
+}
+
+/// Parameters of the oracle's model by what they belong to: those from `of_paper` on in the order in which
+/// append_hidden() made them. One that was left out of the fit is in no group.
+std::vector<Group> groups_of(const hidden::Case& c, const ParametricModel& model, std::size_t of_paper,
+                             const Fitted& truth) {
+  const std::vector<Parameter>& in_fit = truth.unknowns.parameters;
+  const auto place_of = [&](const Parameter& p) {
+    return static_cast<std::size_t>(
+        std::find_if(in_fit.begin(), in_fit.end(),
+                     [&](const Parameter& q) { return q.terms == p.terms && q.value == p.value; }) -
+        in_fit.begin());
+  };
+  std::vector<Group> groups;
+  std::size_t next = of_paper;
+  const auto take = [&](const EffectId& id, std::size_t count) {
+    Group g{id, {}};
+    for (std::size_t k = 0; k < count; ++k, ++next) {
+      const std::size_t place = place_of(model.parameters[next]);
+      if (place < in_fit.size()) g.parameters.push_back(place);
+    }
+    groups.push_back(g);
+  };
+  for (const hidden::Effect& e : c.hidden) take(e.id, e.values.size());
+  EffectId id;
+  if (c.bump) {
+    id.effect = Effect::joint_curve;
+    id.joint = c.bump->joint;
+    take(id, 1);
+  }
+  if (c.outside) {
+    id.effect = Effect::unnamed;
+    id.place = {static_cast<std::uint8_t>(c.outside->joint), flexcomp::slot::theta};
+    take(id, 1);
+  }
+  if (c.row != hidden::Row::geometry) return groups;
+  for (std::size_t p = 0; p < of_paper; ++p) {
+    const flexcomp::Term<double>& t = model.set.terms[model.parameters[p].terms.front()];
+    if (t.effect == Effect::geometric) continue;
+    id.effect = t.effect;
+    id.joint = t.effect == Effect::joint_compliance ? t.place.body : 0U;
+    const auto same =
+        std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return same_name(g.id, id); });
+    if (same == groups.end()) {
+      groups.push_back({id, {p}});
+    } else {
+      same->parameters.push_back(p);
+    }
+  }
+  return groups;
+}
 
 }  // namespace
 
@@ -246,127 +381,31 @@ Oracle oracle_of(const hidden::Case& c) {
   Unknowns all;
   all.frames = full.known.fitted.frames;
   all.parameters = model.parameters;
-  const Index frames = static_cast<Index>(all.frames.size());
-  std::vector<bool> kept(model.parameters.size(), true);
-  {
-    const auto prepared = prepare(start.set, c.robot, "oracle");
-    const MatrixXd columns = linearised(start, *prepared, rows, all).derivative;
-    Span span(columns.rows());
-    span.add(columns.leftCols(frames + static_cast<Index>(of_paper)));
-    for (std::size_t p = of_paper; p < model.parameters.size(); ++p) {
-      const Index rank = span.basis().cols();
-      span.add(columns.col(frames + static_cast<Index>(p)));
-      kept[p] = span.basis().cols() > rank;
-    }
-  }
-  Unknowns fitted;
-  fitted.frames = all.frames;
-  std::vector<std::size_t> place(model.parameters.size());  // in `fitted`
-  for (std::size_t p = 0; p < model.parameters.size(); ++p) {
-    place[p] = fitted.parameters.size();
-    if (kept[p]) {
-      fitted.parameters.push_back(model.parameters[p]);
-    } else {
-      model.parameters[p].set(start.set, 0);
-    }
-  }
-  fitted.prior = prior_knowledge(start.set, fitted.parameters, true, {});
-  EstimatorOptions plain_squares;
-  plain_squares.robust = false;
-  const Fit fit = flexcomp::host::fit(start, fitted, rows, c.robot, plain_squares);
-  out.estimate = fit.estimate;
-  out.converged = fit.converged;
-  out.chi2 = fit.chi2;
+  const Fitted truth = fitted(start, independent(start, all, of_paper, rows, c.robot), rows, c.robot);
+  out.estimate = truth.estimate;
+  out.converged = truth.converged;
+  out.chi2 = truth.chi2;
 
-  // What is hidden, group by group.
-  std::vector<Group> groups;
-  std::size_t next = of_paper;
-  const auto take = [&](const EffectId& id, std::size_t count) {
-    Group g{id, {}};
-    for (std::size_t k = 0; k < count; ++k, ++next) {
-      if (kept[next]) g.parameters.push_back(place[next]);
-    }
-    groups.push_back(g);
-  };
-  for (const hidden::Effect& e : c.hidden) take(e.id, e.values.size());
-  if (c.bump) {
-    EffectId id;
-    id.effect = Effect::joint_curve;
-    id.joint = c.bump->joint;
-    take(id, 1);
-  }
-  if (c.outside) {
-    EffectId id;
-    id.effect = Effect::unnamed;
-    id.place = {static_cast<std::uint8_t>(c.outside->joint), flexcomp::slot::theta};
-    take(id, 1);
-  }
-  if (c.row == hidden::Row::geometry) {
-    for (std::size_t p = 0; p < of_paper; ++p) {
-      const flexcomp::Term<double>& t = start.set.terms[fitted.parameters[p].terms.front()];
-      if (t.effect == Effect::geometric) continue;
-      EffectId id;
-      id.effect = t.effect;
-      id.joint = t.effect == Effect::joint_compliance ? t.place.body : 0U;
-      const auto same = std::find_if(groups.begin(), groups.end(),
-                                     [&](const Group& g) { return same_name(g.id, id); });
-      if (same == groups.end()) {
-        groups.push_back({id, {p}});
+  const std::vector<Group> groups = groups_of(c, model, of_paper, truth);
+  for (const Group& g : groups) out.hidden.push_back({g.id, 0, "nothing", 0});
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    Estimate without = truth.estimate;
+    Unknowns others;
+    others.frames = truth.unknowns.frames;
+    for (std::size_t p = 0; p < truth.unknowns.parameters.size(); ++p) {
+      const std::vector<std::size_t>& own = groups[g].parameters;
+      if (std::find(own.begin(), own.end(), p) == own.end()) {
+        others.parameters.push_back(truth.unknowns.parameters[p]);
       } else {
-        same->parameters.push_back(p);
+        truth.unknowns.parameters[p].set(without.set, 0);
       }
     }
-  }
-  if (groups.empty()) return out;
-
-  // Everything else in the model linearised at the oracle's fit.
-  const auto prepared = prepare(out.estimate.set, c.robot, "oracle");
-  const Linearised lin = linearised(out.estimate, *prepared, rows, fitted);
-  const VectorXd units = units_of(fitted, out.estimate.set);
-  VectorXd target = lin.residual;  // what a model without any of the hidden has to explain
-  std::vector<MatrixXd> columns;
-  std::vector<bool> hidden_column(fitted.count(), false);
-  for (const Group& g : groups) {
-    std::vector<std::size_t> which;
-    for (const std::size_t p : g.parameters) {
-      const std::size_t column = fitted.frames.size() + p;
-      which.push_back(column);
-      hidden_column[column] = true;
-      target += lin.derivative.col(static_cast<Index>(column)) *
-                (fitted.parameters[p].get(out.estimate.set) / units[static_cast<Index>(column)]);
-    }
-    columns.push_back(columns_of(lin.derivative, which));
-  }
-  std::vector<std::size_t> others;
-  for (std::size_t k = 0; k < fitted.count(); ++k) {
-    if (!hidden_column[k]) others.push_back(k);
-  }
-  Span core(lin.residual.size());
-  core.add(columns_of(lin.derivative, others));
-  const std::vector<Candidate> candidates = candidates_of(c, out.estimate, rows);
-  const double log_n = std::log(measured_numbers(rows));
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    Span rest = core;
-    for (std::size_t k = 0; k < groups.size(); ++k) {
-      if (k != g) rest.add(columns[k]);
-    }
-    const VectorXd left = target - rest.basis() * (rest.basis().transpose() * target);
-    const double gain = bic_gain({groups[g].id, columns[g], 0, false}, rest, left, log_n);
-    Hidden h;
-    h.id = groups[g].id;
-    h.detection = h.margin = gain;
-    h.rival = "nothing";
-    for (const Candidate& candidate : candidates) {
-      const bool true_name = std::any_of(groups.begin(), groups.end(), [&](const Group& other) {
-        return same_name(other.id, candidate.id);
-      });
-      if (true_name) continue;
-      const double margin = gain - bic_gain(candidate, rest, left, log_n);
-      if (margin >= h.margin) continue;
-      h.margin = margin;
-      h.rival = name(candidate.id);
-    }
-    out.hidden.push_back(h);
+    const Fitted rest = fitted(without, others, rows, c.robot);
+    Hidden& h = out.hidden[g];
+    h.detection = rest.bic - truth.bic;
+    double best = rest.bic;
+    find_rival(c, rest, rows, groups, best, h.rival);
+    h.margin = best - truth.bic;
   }
   return out;
 }

@@ -48,11 +48,13 @@ Outcome failed(const hidden::Case& c, const std::string& why) {
 
 std::string line_of(const Outcome& o) {
   return fmt::format(
-      "{} {} {}: hidden {}; said {}; {} (BIC {:.1f} to {}); held-out rms {:.1f} of {:.1f} um (before {:.1f}), "
+      "{} {} {}: hidden {}; said {}; {} (BIC {:.1f} to {}); held-out rms {:.1f} of {:.1f} um (before "
+      "{:.1f}), "
       "{:.2f} s",
       hidden::name(o.row), o.seed, o.arm, o.what, o.said,
       o.decidable ? "decidable" : (o.detectable ? "undecidable" : "undetectable"), o.margin,
-      o.rival.empty() ? "nothing" : o.rival, o.rms_m * 1e6, o.rms_oracle_m * 1e6, o.rms_before_m * 1e6, o.seconds);
+      o.rival.empty() ? "nothing" : o.rival, o.rms_m * 1e6, o.rms_oracle_m * 1e6, o.rms_before_m * 1e6,
+      o.seconds);
 }
 
 std::string quoted(const std::string& text) {
@@ -197,15 +199,15 @@ void print_gap(hidden::Row row, const std::vector<Outcome>& outcomes) {
   }
   const double median = quantile(ratio, 0.5);
   const double late = quantile(ratio, 0.95);
-  fmt::print("  held-out rms over the oracle's: median {:.3f} ({}), 95 % quantile {:.3f} ({}), largest {:.3f}\n",
-             median, median <= 1.02 ? "met" : "MISSED", late, late <= 1.10 ? "met" : "MISSED",
-             quantile(ratio, 1));
+  fmt::print(
+      "  held-out rms over the oracle's: median {:.3f} ({}), 95 % quantile {:.3f} ({}), largest {:.3f}\n",
+      median, median <= 1.02 ? "met" : "MISSED", late, late <= 1.10 ? "met" : "MISSED", quantile(ratio, 1));
   if (row == hidden::Row::none) return;
   const double shrink = 1 - after / before;
   const double best = 1 - oracle / before;
   const double goal = row == hidden::Row::outside ? 0.5 : 0.9;
-  fmt::print("  pooled shrink of the gap: {:.3f}, the oracle's {:.3f}: {:.3f} of it (goal {}: {})\n", shrink, best,
-             shrink / best, goal, shrink / best >= goal ? "met" : "MISSED");
+  fmt::print("  pooled shrink of the gap: {:.3f}, the oracle's {:.3f}: {:.3f} of it (goal {}: {})\n", shrink,
+             best, shrink / best, goal, shrink / best >= goal ? "met" : "MISSED");
 }
 
 void print_groups(const std::vector<Outcome>& outcomes) {
@@ -222,8 +224,8 @@ void print_groups(const std::vector<Outcome>& outcomes) {
         list, [](const Outcome&) { return true; }, [](const Outcome& o) { return o.wrong; });
     std::vector<double> ratio;
     for (const Outcome& o : list) ratio.push_back(o.ratio());
-    fmt::print("  {:<26} {:>6} {:>10} {:>12} {:>10} {:>8} {:>12.3f}\n", name, list.size(), right.of, right.hits,
-               listed.hits, wrong.hits, quantile(ratio, 0.5));
+    fmt::print("  {:<26} {:>6} {:>10} {:>12} {:>10} {:>8} {:>12.3f}\n", name, list.size(), right.of,
+               right.hits, listed.hits, wrong.hits, quantile(ratio, 0.5));
   }
 }
 
@@ -282,9 +284,9 @@ int main(int argc, char** argv) {
     }
     const std::uint64_t last = options.seed + options.cases - 1;
     fmt::print("seeds {} to {}: {}\n", options.seed, last,
-               options.seed >= first_held_back ? "held back"
-                                               : (last >= first_held_back ? "for development AND held back"
-                                                                          : "for development"));
+               options.seed >= first_held_back
+                   ? "held back"
+                   : (last >= first_held_back ? "for development AND held back" : "for development"));
     std::fflush(stdout);
     std::map<hidden::Row, std::vector<Outcome>> results;
     for (const hidden::Row row : rows) {

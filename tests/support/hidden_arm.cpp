@@ -70,8 +70,8 @@ plain::Nominal nominal_of(const arms::Robot& robot) {
 
 struct ArmData {
   double payload_kg;
-  double softness;    ///< compliances over those of Table 1: the heavy arm is stiffer, both sag by 1 to 2 mm
-  double foot_z_m;    ///< where the arm stands: what a pedestal tilts about
+  double softness;  ///< compliances over those of Table 1: the heavy arm is stiffer, both sag by 1 to 2 mm
+  double foot_z_m;  ///< where the arm stands: what a pedestal tilts about
   double column_radius_m;
 };
 constexpr std::array<ArmData, 3> arm_data{
@@ -186,8 +186,7 @@ void draw_rigid_arm(Case& c, Random& random) {
 void draw_flexible_arm(Case& c, Random& random) {
   const std::array<double, 6> stiffness{1.47e7, 6.67e4, 3.13e4, 2.22e4, 1.18e3, 7.69e2};  // N·m/rad
   for (int j = 0; j < 6; ++j) {
-    c.truth.joint_compliance.push_back({j + 1, arm_data[c.arm].softness *
-                                                   random.uniform(0.5, 1.5) /
+    c.truth.joint_compliance.push_back({j + 1, arm_data[c.arm].softness * random.uniform(0.5, 1.5) /
                                                    stiffness[static_cast<std::size_t>(j)]});
   }
   c.truth.link_gravity.push_back({0.0015 * random.uniform(0.5, 1.5), 0.00123 * random.uniform(0.5, 1.5),
@@ -360,8 +359,8 @@ std::vector<Effect> draw_effect(const Case& c, const Session& session, Random& r
       // A millionth first: the size follows from what it does, and a tilt beyond a milliradian is no link's.
       for (double& v : e.values) v *= 1e-6;
       const double wanted = random.uniform(0.1e-3, 0.4e-3);
-      const double scale = std::min(wanted / reach_of(c, session, e).moved_m,
-                                    1e-3 / std::max(tilt_of(c, session, e), 1e-12));
+      const double scale =
+          std::min(wanted / reach_of(c, session, e).moved_m, 1e-3 / std::max(tilt_of(c, session, e), 1e-12));
       for (double& v : e.values) v *= scale;
       return {e};
     }
@@ -412,9 +411,9 @@ Effect draw_slip_or_drift(const Case& c, const Session& session, Kind kind, Rand
 
 /// The same entry of the catalogue, or one that holds the other.
 bool collide(const EffectId& a, const EffectId& b) {
-  return a.effect == b.effect && (a.effect == Kind::thermal_growth ||
-                                  (a.joint == b.joint && a.from == b.from && a.link == b.link &&
-                                   a.order == b.order));
+  return a.effect == b.effect &&
+         (a.effect == Kind::thermal_growth ||
+          (a.joint == b.joint && a.from == b.from && a.link == b.link && a.order == b.order));
 }
 
 void hide(plain::Truth& truth, const Effect& effect) {
@@ -518,7 +517,8 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
       const plain::Joints& at = session.q[random.below(session.q.size())];
       const double x0 = at[a - 1];
       const double y0 = at[b - 1];
-      out.formula = fmt::format("bump at q{} = {:.0f}, q{} = {:.0f} deg", a, x0 / arms::deg, b, y0 / arms::deg);
+      out.formula =
+          fmt::format("bump at q{} = {:.0f}, q{} = {:.0f} deg", a, x0 / arms::deg, b, y0 / arms::deg);
       out.shape = [x0, y0](double x, double y) {
         const double u = folded(x - x0);
         const double v = folded(y - y0);
@@ -556,9 +556,9 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
   }
   double square = 0;
   for (std::size_t k = 0; k < session.q.size(); ++k) {
-    const double f = out.shape(
-        value_of(out.covariate[0], out.covariate_joint[0], session.q[k], session.situation[k]),
-        value_of(out.covariate[1], out.covariate_joint[1], session.q[k], session.situation[k]));
+    const double f =
+        out.shape(value_of(out.covariate[0], out.covariate_joint[0], session.q[k], session.situation[k]),
+                  value_of(out.covariate[1], out.covariate_joint[1], session.q[k], session.situation[k]));
     square += f * f / static_cast<double>(session.q.size());
   }
   out.amplitude_rad = random.signed_size(20, 80) * arcsec / std::sqrt(square);
@@ -624,7 +624,7 @@ std::string words(const Case& c) {
   return text.empty() ? "nothing" : text;
 }
 
-constexpr std::array<const char*, 8> row_names{"one", "none", "local",    "outside",
+constexpr std::array<const char*, 8> row_names{"one", "none",  "local",    "outside",
                                                "two", "third", "geometry", "rough"};
 
 }  // namespace
@@ -758,9 +758,8 @@ Case draw(Row row, std::uint64_t seed) {
   if (c.outside) {
     c.truth.hook.emplace_back([o = *c.outside](const plain::Joints& q, const plain::Situation& s,
                                                std::array<plain::Moved, 6>& e) {
-      e[o.joint - 1].theta +=
-          o.amplitude_rad * o.shape(value_of(o.covariate[0], o.covariate_joint[0], q, s),
-                                    value_of(o.covariate[1], o.covariate_joint[1], q, s));
+      e[o.joint - 1].theta += o.amplitude_rad * o.shape(value_of(o.covariate[0], o.covariate_joint[0], q, s),
+                                                        value_of(o.covariate[1], o.covariate_joint[1], q, s));
     });
   }
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -812,8 +811,8 @@ void append_shape(ParametricModel& model, const EffectId& id, const std::vector<
   append_values(model, id, values, c);
   model.parameters.resize(first);
   model.set.terms.back().coefficient = size;
-  model.parameters.push_back({flexcomp::host::name(id) + ".size", flexcomp::host::unit::si,
-                              {model.set.terms.size() - 1}, {}});
+  model.parameters.push_back(
+      {flexcomp::host::name(id) + ".size", flexcomp::host::unit::si, {model.set.terms.size() - 1}, {}});
 }
 
 std::vector<double> nodes_of(const Case& c, Covariate kind, unsigned joint) {
@@ -902,7 +901,8 @@ flexcomp::host::TermSet terms_of(const Case& c) {
 
 void dump(const Case& c, const std::string& folder) {
   namespace host = flexcomp::host;
-  const auto save_rows = [&](const std::string& file, const std::vector<Observation>& rows, std::size_t first) {
+  const auto save_rows = [&](const std::string& file, const std::vector<Observation>& rows,
+                             std::size_t first) {
     host::DataFile data;
     data.kind = host::MeasurementKind::pose;
     data.columns = c.columns;

@@ -72,17 +72,17 @@ struct Case {
   std::string arm_name;
   flexcomp::host::RobotFile robot;
   plain::Nominal nominal;
-  plain::Truth truth;            ///< everything: geometry, compliances, gravity, and what is hidden
-  std::vector<Effect> hidden;    ///< effects of the catalogue that are hidden
+  plain::Truth truth;          ///< everything: geometry, compliances, gravity, and what is hidden
+  std::vector<Effect> hidden;  ///< effects of the catalogue that are hidden
   std::optional<Outside> outside;
   std::optional<Bump> bump;
   Roughness roughness = Roughness::nothing;
   std::string what;  ///< for people
   flexcomp::host::ContextColumns columns;
   std::vector<flexcomp::host::Observation> train, held_out;
-  std::vector<bool> wild;            ///< per training row: an outlier
-  std::vector<double> move_rad;      ///< six per row, training rows first
-  std::size_t inside_the_bump = 0;   ///< training rows
+  std::vector<bool> wild;           ///< per training row: an outlier
+  std::vector<double> move_rad;     ///< six per row, training rows first
+  std::size_t inside_the_bump = 0;  ///< training rows
 
   /// Without the outliers.
   std::vector<flexcomp::host::Observation> clean_train() const;
