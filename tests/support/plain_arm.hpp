@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 namespace plain {
@@ -149,6 +150,14 @@ struct Grid {
   std::vector<double> values;         ///< row by row
 };
 
+/// Values of the slots of one link that effects add; gamma comes between Trans(x, a) and Rot(x, alpha).
+struct Moved {
+  double theta = 0, d = 0, a = 0, alpha = 0, beta = 0, gamma = 0;
+};
+
+/// An effect that no catalogue has: moves links by anything that a row holds.
+using Hook = std::function<void(const Joints&, const Situation&, std::array<Moved, 6>&)>;
+
 /// A true arm.
 struct Truth {
   std::array<Link, 6> geometric{};
@@ -170,6 +179,7 @@ struct Truth {
   std::vector<PayloadError> payload_error;
   std::vector<ReflectorSlip> reflector_slip;
   std::vector<Grid> grid;
+  std::vector<Hook> hook;
 };
 
 /// δ(q) = Σ c_k B(M q / 2π − k), B the cardinal cubic B-spline centred at 0, q folded to a turn: summed over the
@@ -207,11 +217,6 @@ inline double bilinear(const Grid& g, double row, double column) {
   return (1 - u) * ((1 - v) * at(i, j) + v * at(i, j + 1)) +
          u * ((1 - v) * at(i + 1, j) + v * at(i + 1, j + 1));
 }
-
-/// Values of the slots of one link that effects add; gamma comes between Trans(x, a) and Rot(x, alpha).
-struct Moved {
-  double theta = 0, d = 0, a = 0, alpha = 0, beta = 0, gamma = 0;
-};
 
 /// F0 and the frames after each link.
 inline std::array<Matrix, 7> chain(const Nominal& n, const Truth& t, const Joints& q,
@@ -334,6 +339,7 @@ inline Result forward(const Nominal& n, const Truth& t, const Joints& q, const S
     base.ry += x.ry_rad_per_nm * m.y();
   }
   for (const auto& x : t.grid) on(x.joint).theta += bilinear(x, reading(x.row_joint), s.payload_kg);
+  for (const Hook& hook : t.hook) hook(q, s, e);
   r.measured_point = Vector::Zero();
   for (const auto& x : t.reflector_slip)
     if (s.time_s >= x.after_s) r.measured_point += x.shift;
