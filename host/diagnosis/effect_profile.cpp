@@ -154,17 +154,26 @@ std::optional<EffectProfile> profile_of(const RobotFile& robot, const Calibratio
     covariance = factor * factor.transpose();
   }
   const Linearised drawn = linearised(with, *model, places, unknowns);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    Eigen::VectorXd slope(static_cast<Eigen::Index>(group->parameters.size()));
+  const auto count = static_cast<Eigen::Index>(places.size());
+  Eigen::MatrixXd slopes(count, static_cast<Eigen::Index>(group->parameters.size()));
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Observation& row = places[static_cast<std::size_t>(k)];
     ProfilePoint point;
-    point.x = x_of(*what, id, *model, places[k]);
-    for (Eigen::Index p = 0; p < slope.size(); ++p) {
-      slope[p] = along(drawn.derivative.col(p + 1), drawn.derivative.col(0), i) * units[0] / units[p + 1];
-      point.value_rad += slope[p] * group->parameters[static_cast<std::size_t>(p)].get(with.set);
+    point.x = x_of(*what, id, *model, row);
+    for (Eigen::Index p = 0; p < slopes.cols(); ++p) {
+      slopes(k, p) = along(drawn.derivative.col(p + 1), drawn.derivative.col(0), k) * units[0] / units[p + 1];
+      point.value_rad += slopes(k, p) * group->parameters[static_cast<std::size_t>(p)].get(with.set);
     }
-    if (covariance.size() > 0) point.sigma_rad = std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
     out.line.push_back(point);
+  }
+  if (covariance.size() > 0) {
+    // A turn of the joint that is the same everywhere is geometry: that this is not known is not the effect's doubt.
+    const Eigen::RowVectorXd mean = slopes.colwise().mean();
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const Eigen::RowVectorXd slope = slopes.row(k) - mean;
+      out.line[static_cast<std::size_t>(k)].sigma_rad =
+          std::sqrt(std::max(0.0, (slope * covariance * slope.transpose()).value()));
+    }
   }
   std::sort(out.line.begin(), out.line.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
   return out;

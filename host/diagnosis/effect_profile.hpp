@@ -16,7 +16,8 @@ namespace flexcomp::host {
 struct ProfilePoint {
   double x = 0;          ///< of EffectProfile::x_name
   double value_rad = 0;  ///< by which the effect turns its joint
-  double sigma_rad = 0;  ///< from the calibration's covariance; 0 where it has none
+  double sigma_rad =
+      0;  ///< of its shape about its mean, from the calibration's covariance; 0 where it has none
 };
 
 /// What one row says of the joint's turn, carried back from the tool: weighted least squares on the joint's screw.

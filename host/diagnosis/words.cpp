@@ -11,6 +11,8 @@
 namespace flexcomp::host {
 namespace {
 
+/// Of more effects than these the verdict gives the number: the table below names them.
+constexpr std::size_t named_in_full = 5;
 constexpr double arcsec_per_rad = 180.0 * 3600.0 / pi;
 
 /// once, twice, 3 times, 2.5 times
@@ -138,14 +140,24 @@ std::string where_sentence(const Misfit& where) {
 
 std::string verdict_sentence(const Diagnosis& d) {
   if (d.verdict == Verdict::none) {
-    return "Nothing is missing: the model explains these data down to their noise.";
+    return fmt::format(
+        "Nothing is missing: the model explains these data down to their noise{}.",
+        d.outliers.empty()
+            ? ""
+            : fmt::format(", but for {} rows far outside it that do not count in full", d.outliers.size()));
   }
   std::vector<std::string> named;
-  for (const FoundEffect& e : d.effects) named.push_back(in_words(e.id));
+  for (const FoundEffect& e : d.effects) {
+    if (named.size() == named_in_full) break;
+    named.push_back(in_words(e.id));
+  }
+  if (named.size() < d.effects.size())
+    named.push_back(fmt::format("and {} more", d.effects.size() - named.size()));
   if (d.verdict == Verdict::named) {
-    return fmt::format("{} missing and {} a name: {}. Nothing else is left above the noise.",
-                       named.size() == 1 ? "One effect was" : fmt::format("{} effects were", named.size()),
-                       named.size() == 1 ? "has" : "have", fmt::format("{}", fmt::join(named, "; ")));
+    return fmt::format(
+        "{} missing and {} a name: {}. Nothing else is left above the noise.",
+        named.size() == 1 ? "One effect was" : fmt::format("{} effects were", d.effects.size()),
+        named.size() == 1 ? "has" : "have", fmt::format("{}", fmt::join(named, "; ")));
   }
   std::string text = "Something is wrong that no effect of the catalogue explains";
   if (d.where) text += ", " + where_sentence(*d.where);

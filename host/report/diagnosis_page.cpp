@@ -121,7 +121,8 @@ std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile&
   Curves remains{title + ": what is left", profile.x_name, "arcsec", {}, false, {left}};
   return {{plot_curves(seen),
            title + ": by how much the joint turns otherwise. Dots: what each row says, with this effect "
-                   "alone taken out of the model; line: the effect with its 95 % band."},
+                   "alone taken out of the model; line: the effect with its 95 % band (of its shape: a turn "
+                   "that is the same everywhere is geometry)."},
           {plot_curves(remains),
            title + ": what each row says with the effect in the model. Noise has no shape."}};
 }

@@ -42,7 +42,8 @@ tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
 .plots.wide { grid-template-columns: repeat(auto-fit, minmax(min(400px, 100%), 1fr)); }
 figure { margin: .4rem 0; min-width: 0; max-width: 560px; } figcaption { color: var(--soft); font-size: .85rem; }
 svg { display: block; width: 100%; height: auto; }
-svg text { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; fill: var(--soft); }
+svg text { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; fill: var(--soft);
+  paint-order: stroke; stroke: var(--paper); stroke-width: 3px; }
 svg text.name { fill: var(--ink); }
 path { fill: none; stroke-width: 1; } .grid { stroke: var(--grid); } .axis { stroke: var(--axis); }
 .stem { stroke: var(--axis); stroke-opacity: .45; } .floor { stroke: var(--floor); stroke-dasharray: 4 3; }

@@ -24,7 +24,7 @@ paste -d, "$work/stood_commands.csv" "$work/stood_host.csv" | awk -F, '
 echo "ok: the control cycle gives the same commands"
 mean() { # mean COMMANDS: of the position error of the true arm, mm
   "$FLEXCOMP_BIN_DIR/flexcomp-plant" where --robot "$FLEXCOMP_SOURCE_DIR/host/robots/tx60l.yaml" \
-    --truth "$FLEXCOMP_SOURCE_DIR/tests/data/tx60l_table1.yaml" --joints "$1" --nominal "$work/stood.csv" \
+    --truth "$work/truth.yaml" --joints "$1" --nominal "$work/stood.csv" \
     -o "$work/where.csv" --json "$work/where.json" >/dev/null
   sed -n 's/.*"mean_mm": *\([-+0-9.eE]*\).*/\1/p' "$work/where.json"
 }
