@@ -217,6 +217,15 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   for (int round = 0; round < 3; ++round) {
     if (best.blocks.empty()) break;
     scan(remainder(search, best), 1);
+    // Each scanned one is looked for anew with the others in place: the first look had them in the way.
+    for (const std::size_t b : best.blocks) {
+      if (system.blocks[b].width_rad == 0 && system.blocks[b].id.effect != Effect::reflector_slip) continue;
+      Subset others;
+      for (const std::size_t o : best.blocks) {
+        if (o != b) others.push_back(o);
+      }
+      scan(remainder(search, search.score(others)), 1);
+    }
     const Scored better = search.best(most_effects, {best.blocks});
     if (!(search.value(better) > search.value(best) + 1e-9)) break;
     best = better;

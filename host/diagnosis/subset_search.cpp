@@ -11,9 +11,9 @@ namespace {
 
 constexpr double minus_infinity = -std::numeric_limits<double>::infinity();
 
-/// Precision given to coefficients without a prior, per square unit: a hundred thousand units wide, so that it decides
-/// only what the data leave wholly open.
-constexpr double nearly_free = 1e-10;
+/// Share of a column's own information that is added to it where it has no prior, so that directions which the columns
+/// of a set leave wholly open (the sum of a curve's splines) stay at zero.
+constexpr double nearly_free = 1e-8;
 
 /// What is left of a column after the others, by which it counts as theirs (squared share).
 constexpr double spanned = 1e-6;
@@ -33,6 +33,11 @@ SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2, double 
   gram_.selfadjointView<Eigen::Lower>().rankUpdate(system.columns.transpose(), 1 / scale2_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   product_ = system.columns.transpose() * system.residual / scale2_;
+  total_ = system.residual.squaredNorm() / scale2_ * (1 + 1e-9);
+}
+
+double SubsetSearch::precision_of(const Block& block, Eigen::Index column) const {
+  return block.precision > 0 ? block.precision : nearly_free * gram_(column, column);
 }
 
 void SubsetSearch::extend() {
@@ -92,8 +97,7 @@ Scored SubsetSearch::score(const Subset& subset) const {
   prior.resize(n);
   Eigen::Index at = 0;
   for (const std::size_t b : ordered) {
-    const double p = system_.blocks[b].precision > 0 ? system_.blocks[b].precision : nearly_free;
-    for (std::size_t k = 0; k < system_.blocks[b].columns.size(); ++k) prior[at++] = p;
+    for (const Eigen::Index c : system_.blocks[b].columns) prior[at++] = precision_of(system_.blocks[b], c);
   }
   normal.diagonal() += prior;
   const Eigen::LLT<Eigen::MatrixXd> factor(normal);
@@ -103,6 +107,11 @@ Scored SubsetSearch::score(const Subset& subset) const {
   }
   out.solution = factor.solve(right);
   out.chi2_gain = out.solution.dot(right);
+  // More than there is: the columns are one another's to rounding.
+  if (!(out.chi2_gain <= total_)) {
+    out.gain = minus_infinity;
+    return out;
+  }
   out.gain = out.chi2_gain;
   at = 0;
   for (const std::size_t b : ordered) {
@@ -131,7 +140,7 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
   for (const std::size_t b : subset) {
     for (const Eigen::Index c : system_.blocks[b].columns) {
       index.push_back(c);
-      prior.push_back(system_.blocks[b].precision > 0 ? system_.blocks[b].precision : nearly_free);
+      prior.push_back(precision_of(system_.blocks[b], c));
     }
   }
   const Eigen::Index n = static_cast<Eigen::Index>(index.size());
@@ -167,7 +176,7 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
         normal(i, k) = normal(k, i) = gram_(ci, ck) - (n > 0 ? reduced.col(ci).dot(reduced.col(ck)) : 0);
       }
       if (normal(i, i) < spanned * gram_(ci, ci) && size == 1) is_spanned = true;
-      normal(i, i) += block.precision > 0 ? block.precision : std::max(nearly_free, 1e-9 * gram_(ci, ci));
+      normal(i, i) += precision_of(block, ci);
     }
     if (is_spanned) continue;
     const Eigen::LLT<Eigen::MatrixXd> factor(normal);
@@ -198,6 +207,9 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
   std::set<Subset> seen;
   int idle = 0;
   for (std::size_t depth = 0; depth < largest && idle < 2; ++depth) {
+    front.erase(
+        std::remove_if(front.begin(), front.end(), [&](const Subset& s) { return s.size() >= largest; }),
+        front.end());
     std::vector<std::pair<double, Subset>> next;
     for (const Subset& s : front) {
       const double here = score(s).gain;
@@ -270,10 +282,7 @@ Eigen::VectorXd SubsetSearch::largest_single_gains(const Eigen::MatrixXd& residu
       for (Eigen::Index k = 0; k < size; ++k)
         normal(i, k) =
             gram_(block.columns[static_cast<std::size_t>(i)], block.columns[static_cast<std::size_t>(k)]);
-      normal(i, i) += block.precision > 0
-                          ? block.precision
-                          : std::max(nearly_free, 1e-9 * gram_(block.columns[static_cast<std::size_t>(i)],
-                                                               block.columns[static_cast<std::size_t>(i)]));
+      normal(i, i) += precision_of(block, block.columns[static_cast<std::size_t>(i)]);
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(normal);
     if (factor.info() != Eigen::Success) continue;

@@ -59,10 +59,13 @@ class SubsetSearch {
   double value(const Scored& s) const { return s.gain - margin_ * static_cast<double>(s.blocks.size()); }
 
  private:
+  double precision_of(const Block& block, Eigen::Index column) const;
+
   const GapSystem& system_;
   double scale2_;
   double margin_;
   double log_n_;
+  double total_ = 0;  // chi-square of the whole misfit
   Eigen::MatrixXd gram_;     // over the scale
   Eigen::VectorXd product_;  // of the columns with the residual, over the scale
 };
