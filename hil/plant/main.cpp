@@ -24,6 +24,7 @@ using namespace plant;
 
 constexpr double degree = std::numbers::pi / 180;
 constexpr double millimetre = 1e-3;
+constexpr double largest_move_deg = 30;
 
 /// Standard deviations per axis (Chen et al. 2019).
 struct Noise {
@@ -35,6 +36,8 @@ const std::map<std::string, Noise> noises{
 
 struct Options {
   std::string robot, truth, measure = "reflectors", noise = "N1", joints, nominal, out, json;
+  std::vector<double> payloads_kg;
+  bool moves = false;
   unsigned poses = 0;
   std::uint64_t seed = 1;
 };
@@ -74,6 +77,9 @@ void measure(const Options& options) {
     throw std::runtime_error(options.robot + ": tool.reflectors_mm: expected a, b, c (, d)");
   }
   std::vector<std::string> header = joint_names();
+  if (!options.payloads_kg.empty()) header.emplace_back("payload_kg");
+  for (std::size_t j = 1; options.moves && j <= joints; ++j)
+    header.push_back("move" + std::to_string(j) + "_deg");
   if (reflectors) {
     for (std::size_t r = 0; r < robot.reflector_m.size(); ++r) {
       for (const char* axis : {"x_mm", "y_mm", "z_mm"}) header.push_back(std::string(1, "abcd"[r]) + axis);
@@ -96,7 +102,19 @@ void measure(const Options& options) {
       q[j] = shown_deg * degree;
       row.push_back(shown_deg);
     }
-    const Reached arm = reached(robot, truth, q, usual_context(robot));
+    Context context = usual_context(robot);
+    if (!options.payloads_kg.empty()) {
+      context.payload_kg = options.payloads_kg[n % options.payloads_kg.size()];
+      row.push_back(context.payload_kg);
+    }
+    for (std::size_t j = 0; options.moves && j < joints; ++j) {
+      std::uniform_real_distribution<double> move(-largest_move_deg, largest_move_deg);
+      const double shown_deg = std::trunc(move(random) * 1e4) / 1e4;
+      context.move_rad[j] = shown_deg * degree;
+      context.direction[j] = shown_deg > 0 ? 1 : shown_deg < 0 ? -1 : 0;
+      row.push_back(shown_deg);
+    }
+    const Reached arm = reached(robot, truth, q, context);
     if (reflectors) {
       for (const KDL::Vector& r : robot.reflector_m) {
         add(row, arm.tool * (arm.slip + r) + error(noise.position_m));
@@ -200,6 +218,11 @@ int main(int argc, char** argv) {
   measuring->add_option("--noise", options.noise, "N1: 0.035 mm and 0.007 deg per axis; N2: twice that; none")
       ->check(CLI::IsMember({"N1", "N2", "none"}))
       ->capture_default_str();
+  measuring
+      ->add_option("--payloads", options.payloads_kg, "Payloads in turn [kg]; otherwise the robot file's")
+      ->delimiter(',');
+  measuring->add_flag("--moves", options.moves,
+                      "Each joint comes to the pose by a random motion, which is recorded");
   asking->add_option("--joints", options.joints, "Commanded joints, q1_deg … q6_deg")->required();
   asking
       ->add_option(
