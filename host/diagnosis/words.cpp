@@ -243,7 +243,9 @@ std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calib
     if (!e.pushed) measurement.push_back(name(e.id));
     confounded = confounded || !e.confounded_with.empty();
   }
-  if (d.verdict == Verdict::unnamed) {
+  if (!d.doubts.empty()) {
+    steps.push_back(fmt::format("{} is not to be pushed: see why below", calibration));
+  } else if (d.verdict == Verdict::unnamed) {
     steps.push_back(
         fmt::format("into the controller: flexcomp push --to BUS {} --allow-unnamed (an effect that nobody "
                     "understands is pushed only if you say so)",

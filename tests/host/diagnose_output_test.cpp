@@ -235,6 +235,9 @@ TEST(DiagnosisWords, NextStepsFollowTheVerdict) {
   EXPECT_THAT(text("p.csv"), HasSubstr("measure the poses of p.csv"));
   d.verdict = Verdict::unnamed;
   EXPECT_THAT(text(""), HasSubstr("--allow-unnamed"));
+  d.doubts = {"the error did not shrink"};
+  EXPECT_THAT(text(""), HasSubstr("cal2.yaml is not to be pushed"));
+  EXPECT_THAT(text(""), Not(HasSubstr("--to BUS")));
   EXPECT_THAT(verdict_sentence(d),
               HasSubstr("link3.theta, joint 3 moves wrongly: it follows q3 (around 30 deg) and "
                         "payload_kg; a motion of this place alone explains 80 % of it"));
