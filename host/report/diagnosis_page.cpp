@@ -91,6 +91,14 @@ PageSection place(const Diagnosis& d) {
   return section;
 }
 
+/// Twice what nine of ten numbers stay below.
+double bulk(std::vector<double> sizes) {
+  if (sizes.empty()) return 0;
+  const std::size_t most = (sizes.size() - 1) * 9 / 10;
+  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(most), sizes.end());
+  return 2 * sizes[most];
+}
+
 /// The effect with its band, and the rows that speak of it.
 std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile& profile,
                                                             const std::string& title) {
@@ -112,10 +120,17 @@ std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile&
     line.band.push_back(
         {(p.value_rad - 1.96 * p.sigma_rad) / arcsec, (p.value_rad + 1.96 * p.sigma_rad) / arcsec});
   }
+  // The bulk sets the scale; what lies far off is drawn at the edge.
+  std::vector<double> without_sizes, left_sizes;
+  for (const ProfileRow& r : profile.rows) {
+    without_sizes.push_back(std::abs(r.without_rad));
+    left_sizes.push_back(std::abs(r.left_rad));
+  }
+  const double far_without = bulk(without_sizes), far_left = bulk(left_sizes);
   for (const ProfileRow& r : profile.rows) {
     if (r.sigma_rad > enough) continue;
-    without.points.push_back({r.x, r.without_rad / arcsec});
-    left.points.push_back({r.x, r.left_rad / arcsec});
+    without.points.push_back({r.x, std::clamp(r.without_rad, -far_without, far_without) / arcsec});
+    left.points.push_back({r.x, std::clamp(r.left_rad, -far_left, far_left) / arcsec});
   }
   Curves seen{title, profile.x_name, "arcsec", {}, false, {without, line}};
   Curves remains{title + ": what is left", profile.x_name, "arcsec", {}, false, {left}};

@@ -51,8 +51,8 @@ loop harmonic '{effect: gear_harmonic, joint: 3, order: 2, sin_rad: 3.0e-4, cos_
   "$source"/hil/with-vcan --seconds 120 bash "$here/${0##*/}" inside "$work"/harmonic --can vcan0:1
 # A bump over the angle: no sine.
 port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
-loop curve '{effect: joint_curve, joint: 1, coefficients_rad: [0, 0, 4.0e-4, 0, 0, 3.0e-4, 0, -2.0e-4]}' \
-  '{"effect": "joint_curve", "joint": 1}' "modbus-tcp:127.0.0.1:$port:1" \
+loop curve '{effect: joint_curve, joint: 2, coefficients_rad: [0, 0, 4.0e-4, -2.0e-4, 0, 3.0e-4, -4.0e-4, 2.0e-4, 0, 0, 0, 0]}' \
+  '{"effect": "joint_curve", "joint": 2}' "modbus-tcp:127.0.0.1:$port:1" \
   bash "$here/${0##*/}" inside "$work"/curve --modbus-tcp "127.0.0.1:$port:1"
 # What depends on the side from which a joint comes: the controller takes it from the target's context.
 port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')

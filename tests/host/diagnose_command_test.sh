@@ -146,6 +146,26 @@ PYTHON
 grep -qF "tell.csv: " said.txt || fail "nothing is said of tell.csv"
 expect 0 "poses of tell.csv" -- "$flexcomp" simulate --robot "$robot" --truth scale.yaml --joints tell.csv -o told.csv
 
+# --- what has no name: located, described, and pushed only by who says so -------------------------------------------------------
+# A cable that pulls at joint 3 where joint 2 is near 0 and the hand is loaded.
+hidden '{effect: unnamed, place: link3.theta, of: [q2, payload_kg], grid: [[-100, -40, 0, 40, 100], [0, 1.108]], values_rad: [[0, 0], [0, 0], [0, 1.5e-3], [0, 0], [0, 0]]}' >cable.yaml
+simulate --truth cable.yaml --poses 150 --seed 3 --context --payloads 0,1.108 -o cable.csv
+simulate --truth cable.yaml --poses 60 --seed 4 --context --payloads 0,1.108 -o cable_h.csv
+expect 0 "no effect of the catalogue explains" "link3.theta, joint 3 moves wrongly" "--allow-unnamed" -- \
+  diagnose --data cable.csv --holdout cable_h.csv -o k.yaml --json k.json --report k.html
+judge "unnamed, where it is and what it follows" k.json <<'PYTHON'
+assert j["verdict"] == "unnamed", j["verdict"]
+w = j["where"]
+assert (w["place"], w["joint"], set(w["covariates"])) == ("link3.theta", 3, {"q2", "payload_kg"}), w
+assert "unnamed" not in [e["effect"] for e in j["effects"]] and j["unnamed"], j["unnamed"]
+g = j["gap"]
+left = [max(0, g[when]["holdout_rms_mm"] ** 2 - g["noise_floor_mm"] ** 2) for when in ("before", "after")]
+assert left[1] < 0.5 * left[0], g
+PYTHON
+expect 3 "--allow-unnamed" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv
+absent kc.csv
+expect 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv --allow-unnamed
+
 # --- not to be trusted: noise declared three times too large ----------------------------------------------------------------
 awk -F, -v OFS=, 'NR == 1 { for (k = 1; k <= NF; k++) if ($k ~ /^sigma/) s[k] } NR > 1 { for (k in s) $k *= 3 } 1' plain.csv >wide.csv
 expect 5 "not trustworthy" -- diagnose --data wide.csv -o w.yaml --json w.json --report w.html
