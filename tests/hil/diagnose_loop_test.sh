@@ -20,6 +20,10 @@ work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 failed=0
 
+free_port() { # sets port
+  port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+}
+
 # loop NAME EFFECT OF BUS WRAPPER...: OF is what diagnose must name, as the JSON says it
 loop() {
   local name=$1 effect=$2 of=$3 folder
@@ -50,13 +54,29 @@ loop harmonic '{effect: gear_harmonic, joint: 3, order: 2, sin_rad: 3.0e-4, cos_
   '{"effect": "gear_harmonic", "joint": 3, "order": 2}' can:vcan0:1 \
   "$source"/hil/with-vcan --seconds 120 bash "$here/${0##*/}" inside "$work"/harmonic --can vcan0:1
 # A bump over the angle: no sine.
-port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+free_port
 loop curve '{effect: joint_curve, joint: 2, coefficients_rad: [0, 0, 4.0e-4, -2.0e-4, 0, 3.0e-4, -4.0e-4, 2.0e-4, 0, 0, 0, 0]}' \
   '{"effect": "joint_curve", "joint": 2}' "modbus-tcp:127.0.0.1:$port:1" \
   bash "$here/${0##*/}" inside "$work"/curve --modbus-tcp "127.0.0.1:$port:1"
 # What depends on the side from which a joint comes: the controller takes it from the target's context.
-port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+free_port
 loop backlash '{effect: backlash, joint: 2, half_gap_rad: 2.0e-4}' \
   '{"effect": "backlash", "joint": 2}' "modbus-tcp:127.0.0.1:$port:1" \
   bash "$here/${0##*/}" inside "$work"/backlash --modbus-tcp "127.0.0.1:$port:1"
+# What belongs to the measurement is left out of the push, with a word; the rest goes.
+free_port
+mkdir "$work"/lag
+sed 's/^effects:/&\n  - {effect: readout_lag, joint: 1, rad: 1.2e-3}\n  - {effect: base_drift, x_mm_per_h: 0.02}/' \
+  "$work"/harmonic/calibration.yaml >"$work"/lag/lag.yaml
+# shellcheck disable=SC2016
+bash "$here/${0##*/}" inside "$work"/lag --modbus-tcp "127.0.0.1:$port:1" sh -c '
+  "$1"/flexcomp push --to "$2" "$3"/lag.yaml --json "$3"/push.json && "$1"/flexcomp pull --from "$2" --robot "$4" -o "$3"/pulled.yaml' \
+  sh "$bin" "modbus-tcp:127.0.0.1:$port:1" "$work"/lag "$source"/host/robots/tx60l.yaml >"$work"/lag/log 2>&1 || failed=1
+if grep -q 'lag.yaml: left out, for they belong to the measurement: readout_lag\[joint=1\], base_drift' "$work"/lag/log &&
+  grep -q '"left_out"' "$work"/lag/push.json && grep -q 'gear_harmonic' "$work"/lag/pulled.yaml &&
+  ! grep -q 'readout_lag\|base_drift' "$work"/lag/pulled.yaml; then
+  echo "ok: what belongs to the measurement is not pushed, the rest is"
+else
+  echo "FAILED: what belongs to the measurement:"; cat "$work"/lag/log; failed=1
+fi
 exit "$failed"
