@@ -72,18 +72,22 @@ PageSection place(const Diagnosis& d) {
         (d.verdict == Verdict::unnamed ? "The gap that is left is " : "The gap was ") + text + ".");
   }
   section.paragraphs.emplace_back(
-      "How much of what disagrees a free motion of one place alone could explain, beyond what it would "
-      "explain of "
-      "noise. Neighbours share: an arm's places move the tool in similar ways.");
-  Bars bars{
-      "Share of the misfit that each place explains, before and after", "share of the misfit", {}, {}, {}};
+      "How much of the gap a free motion of one place alone could explain, beyond what it would explain of "
+      "noise. "
+      "Neighbours share: an arm's places move the tool in similar ways.");
+  Bars bars{"What each place could explain of the gap, before and after", "mm of the gap (rms)", {}, {}, {}};
+  // In mm: shares of a gap that is nearly gone would look as large as those of the whole.
+  const double gap_mm = gap_of(d.error_before.rms_m, d.noise_floor_m) * 1e3;
+  const double left_mm = gap_of(d.error_after.rms_m, d.noise_floor_m) * 1e3;
   for (const PlaceShare& p : d.places) {
     if (bars.names.size() == shown_places) break;
     bars.names.push_back(place_name(p.place));
-    bars.before.push_back(p.explains);
+    bars.before.push_back(gap_mm * std::sqrt(std::max(0.0, p.explains)));
     const auto left = std::find_if(d.places_left.begin(), d.places_left.end(),
                                    [&](const PlaceShare& l) { return l.place == p.place; });
-    if (!d.places_left.empty()) bars.after.push_back(left == d.places_left.end() ? 0 : left->explains);
+    if (d.places_left.empty()) continue;
+    bars.after.push_back(left == d.places_left.end() ? 0
+                                                     : left_mm * std::sqrt(std::max(0.0, left->explains)));
   }
   if (!bars.names.empty())
     section.figures.emplace_back(plot_bars(bars),

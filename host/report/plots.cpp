@@ -225,6 +225,10 @@ std::string plot_curves(const Curves& c) {
   }
   if (!(y_high >= y_low)) return "";
   if (c.floor) reach(*c.floor);
+  if (!c.x_texts.empty()) {
+    x_low = std::min(x_low, 0.0);
+    x_high = std::max(x_high, static_cast<double>(c.x_texts.size() - 1));
+  }
   const double margin = std::max(1e-9, c.x_texts.empty() ? 0.02 * (x_high - x_low) : 0.5);
   const Scale x{x_low - margin, x_high + margin, false};
   const Scale y = around(y_low, y_high, c.log_y);

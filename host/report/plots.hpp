@@ -60,7 +60,7 @@ std::string plot_histogram(const ErrorPairs& errors);
 /// The three components of the position error that is left, against each joint's angle: what has a shape is not noise.
 std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint);
 
-/// Named shares between 0 and 1 as bars, one above the other, before and after.
+/// Named amounts of 0 or more as bars, one above the other, before and after.
 struct Bars {
   std::string described;
   std::string x_name;

@@ -189,5 +189,45 @@ TEST(Report, EverythingIsDrawnInsideTheFrame) {
   }
 }
 
+TEST(Report, CurvesAndBarsAreDrawnInsideTheFrame) {
+  // One value for all, zeros, a band wider than the line, noise above everything, each way to draw a curve.
+  std::vector<std::string> drawings;
+  for (const double level : {0.0, 1.0, -3e-9, 2e6}) {
+    for (const CurveStyle style :
+         {CurveStyle::usual, CurveStyle::joined, CurveStyle::line, CurveStyle::dots, CurveStyle::steps}) {
+      Curves c{"A level", "x", "y", {}, false, {}};
+      c.curves.push_back(
+          {"level", {{0, level}, {1, level}, {2, level}}, style, "x", {{level - 2, level + 1}}});
+      drawings.push_back(plot_curves(c));
+      c.floor = 7.0;
+      c.x_texts = {"a", "b", "c"};
+      drawings.push_back(plot_curves(c));
+      c.curves[0].points.resize(1);
+      drawings.push_back(plot_curves(c));
+    }
+  }
+  drawings.push_back(plot_bars({"Nothing", "mm", {}, {}, {}}));
+  drawings.push_back(plot_bars({"Zeros", "mm", {"a", "b"}, {0, 0}, {0, 0}}));
+  drawings.push_back(plot_bars({"A long name", "mm", {std::string(60, 'w') + "<&>", "b"}, {1e-9, 3e-9}, {}}));
+  drawings.push_back(plot_bars({"Ten", "mm", std::vector<std::string>(10, "link3.theta"),
+                                std::vector<double>(10, 0.8), std::vector<double>(10, 0.3)}));
+  for (const std::string& svg : drawings) {
+    EXPECT_EQ(unbalanced(svg), "");
+    EXPECT_THAT(svg, Not(HasSubstr("nan")));
+    EXPECT_THAT(svg, Not(HasSubstr("inf")));
+    for (const double v : coordinates(svg)) {
+      ASSERT_GE(v, 0) << svg;
+      ASSERT_LE(v, 360) << svg;
+    }
+  }
+  EXPECT_EQ(plot_curves({"Empty", "x", "y", {}, false, {}}), "");
+  // Steps hold their value until the next: no slanting line.
+  const std::string steps =
+      plot_curves({"Steps", "x", "y", {}, false, {{"", {{0, 1}, {1, 2}, {3, 5}}, CurveStyle::steps}}});
+  const std::size_t line = steps.find("class=\"line after\" d=\"");
+  ASSERT_NE(line, std::string::npos);
+  EXPECT_EQ(occurrences(steps.substr(line, steps.find("/>", line) - line), "L"), 0U);
+}
+
 }  // namespace
 }  // namespace flexcomp::host
