@@ -15,13 +15,13 @@
 
 namespace flexcomp::host {
 
-Page page_of(const Identification& result, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
              const std::string& data);
-Page page_of(const Validation& result, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
              const Calibration& calibration, const std::string& data);
 
 /// \param others  rows that were kept out, where there are any
-Page page_of(const Diagnosis& result, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const RobotFile& robot,
              const std::string& data, const std::optional<HeldOut>& others);
 
 /// What pages of results have in common: a page with its title and who made it when, and the rows as poses of a page.
