@@ -17,6 +17,18 @@ bool varies(const std::vector<Observation>& rows, double (*value)(const Observat
   return false;
 }
 
+/// Numbers of coefficients that are tried: no more than half as many as there are poses, and no finer than 128, which
+/// follows structure down to 6 degrees.
+std::vector<std::size_t> curve_sizes(std::size_t poses) {
+  if (poses >= 600) return {12, 36, 128};
+  if (poses >= 300) return {8, 12, 24, 72};
+  std::vector<std::size_t> sizes;
+  for (const std::size_t size : {6U, 8U, 12U, 16U, 24U, 36U}) {
+    if (2 * size <= poses) sizes.push_back(size);
+  }
+  return sizes;
+}
+
 class Builder {
  public:
   Builder(const RobotFile& robot, const TermSet& set) : robot_(robot) {
@@ -165,12 +177,11 @@ CandidateSet candidates(const RobotFile& robot, const std::vector<Observation>& 
   }
   id = EffectId{.effect = Effect::joint_curve};
   for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    for (const std::size_t size : {6U, 8U, 12U, 16U, 24U, 36U}) {
-      // A curve that has as many coefficients as there are poses fits anything.
-      if (2 * size > rows.size()) continue;
+    for (const std::size_t size : curve_sizes(rows.size())) {
       id.coefficients = size;
       b.add(id);
-      if (size == 24 || size == 36) b.smooth_forms({5e-5, 1.5e-4, 5e-4});
+      // Forms with a prior follow structure that is finer than the data would bear without one.
+      if (size >= 24) b.smooth_forms({5e-5, 1.5e-4, 5e-4});
     }
   }
   std::vector<std::string> no_direction;

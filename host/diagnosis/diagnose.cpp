@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "diagnosis/blas.hpp"
 #include "diagnosis/explanation.hpp"
 #include "diagnosis/refit.hpp"
 #include "diagnosis/remainder.hpp"
@@ -62,7 +63,8 @@ double noise_floor(const std::vector<Observation>& rows) {
 
 /// Chi-square per measured number on poses that were left out, ten folds in a fixed order: the model's own parameters
 /// and the blocks are fitted to nine tenths.
-double cross_validated(const GapSystem& system, const Scored& solution) {
+double cross_validated(const SubsetSearch& search, const Scored& solution) {
+  const GapSystem& system = search.system();
   constexpr std::size_t folds = 10;
   Eigen::Index count = system.nuisance.cols();
   for (const std::size_t b : solution.blocks)
@@ -73,28 +75,30 @@ double cross_validated(const GapSystem& system, const Scored& solution) {
   Eigen::Index at = system.nuisance.cols();
   for (const std::size_t b : solution.blocks) {
     for (const Eigen::Index c : system.blocks[b].columns) {
-      ridge[at] = std::max(system.blocks[b].precision, 1e-10);
+      ridge[at] = search.noise_scale2() * search.precision_of(system.blocks[b], c);
       all.col(at++) = system.columns.col(c);
     }
   }
-  const Eigen::MatrixXd normal = all.transpose() * all;
+  const Eigen::MatrixXd normal = gram(all);
   const Eigen::VectorXd right = all.transpose() * system.residual;
   double sum = 0;
   for (std::size_t fold = 0; fold < folds; ++fold) {
-    Eigen::MatrixXd reduced = normal;
-    Eigen::VectorXd reduced_right = right;
-    reduced.diagonal() += ridge;
     std::vector<Eigen::Index> left_out;
-    for (std::size_t k = fold; k < system.rows; k += folds) {
-      const auto block = all.middleRows<6>(6 * static_cast<Eigen::Index>(k));
-      reduced.noalias() -= block.transpose() * block;
-      reduced_right.noalias() -=
-          block.transpose() * system.residual.segment<6>(6 * static_cast<Eigen::Index>(k));
+    for (std::size_t k = fold; k < system.rows; k += folds)
       left_out.push_back(6 * static_cast<Eigen::Index>(k));
+    Eigen::MatrixXd part(6 * static_cast<Eigen::Index>(left_out.size()), count);
+    Eigen::VectorXd measured(part.rows());
+    for (std::size_t k = 0; k < left_out.size(); ++k) {
+      part.middleRows<6>(6 * static_cast<Eigen::Index>(k)) = all.middleRows<6>(left_out[k]);
+      measured.segment<6>(6 * static_cast<Eigen::Index>(k)) = system.residual.segment<6>(left_out[k]);
     }
-    const Eigen::VectorXd x = reduced.ldlt().solve(reduced_right);
-    for (const Eigen::Index k : left_out)
-      sum += (system.residual.segment<6>(k) - all.middleRows<6>(k) * x).squaredNorm();
+    Eigen::MatrixXd reduced = normal - gram(part);
+    reduced.diagonal() += ridge;
+    Eigen::MatrixXd x = right - part.transpose() * measured;
+    if (!factor_in_place(reduced)) continue;
+    solve_lower(reduced, x);
+    solve_lower_transposed(reduced, x);
+    sum += (measured - part * x.col(0)).squaredNorm();
   }
   return sum / system.numbers;
 }
@@ -136,7 +140,7 @@ class ChanceGains {
             left.residual.segment<6>(6 * static_cast<Eigen::Index>(order[k]));
       }
     }
-    permuted -= system.nuisance * (system.nuisance.transpose() * permuted);
+    permuted -= product(system.nuisance, transposed_product(system.nuisance, permuted));
     const Eigen::VectorXd largest = search.largest_single_gains(permuted);
     maxima_.assign(largest.data(), largest.data() + largest.size());
   }
@@ -228,7 +232,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   out.places = place_shares(system, nothing_found);
   out.places_left = place_shares(system, left);
   const ChanceGains chance(search, left, options.seed);
-  const double all_cv = cross_validated(system, found.solution);
+  const double all_cv = cross_validated(search, found.solution);
   for (const std::size_t b : found.solution.blocks) {
     if (system.blocks[b].id.effect == Effect::unnamed) continue;
     Subset without;
@@ -243,7 +247,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     const Scored less = search.score(without);
     effect.delta_bic = found.solution.gain - less.gain;
     effect.p_value = chance.p_value(effect.delta_bic);
-    const double cv = cross_validated(system, less);
+    const double cv = cross_validated(search, less);
     effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
     effect.pushed = !is_measurement_effect(effect.id.effect);
     effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
@@ -260,8 +264,8 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     const Remainder r = remainder(search, s);
     DiagnosisStep d;
     d.what = std::move(what);
-    d.chi2_per_dof = r.residual.squaredNorm() / std::max(1.0, system.numbers - double(r.basis.cols()));
-    d.cross_validated = cross_validated(system, s);
+    d.chi2_per_dof = r.residual.squaredNorm() / std::max(1.0, system.numbers - r.fitted_numbers);
+    d.cross_validated = cross_validated(search, s);
     double square = 0;
     double count = 0;
     for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -15,7 +15,7 @@ namespace flexcomp::host {
 namespace {
 
 /// What an effect must gain beyond what its parameters cost: as decisive against nothing as against another name.
-constexpr double margin = telling_bic;
+constexpr double margin = least_gain;
 constexpr std::size_t most_effects = 8;
 
 /// A row that nothing explains costs this much chi-square and no more: it is then an outlier (99.9 % of the chi-square of
@@ -310,7 +310,7 @@ void Explainer::judge(Explanation& found) const {
     if (!found.misfit || m.explains > found.misfit->explains) found.misfit = m;
   }
   if (found.unnamed) return;
-  const double dof = found.system->numbers - static_cast<double>(left.basis.cols());
+  const double dof = found.system->numbers - left.fitted_numbers;
   const std::vector<PlaceShare> places = place_shares(*found.system, left);
   const auto worst =
       std::min_element(places.begin(), places.end(),
@@ -356,7 +356,9 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
   const Estimate at = extended(start_, nullptr);
   const auto settle = [&](std::vector<bool> counts, Refit& refit) {
     Explanation e = search(at, counts, noise2, nullptr);
-    for (int round = 0; round < 3; ++round) {
+    // Of many rows a few outliers more or less change no name.
+    const int rounds = rows_.size() > 300 ? 1 : 3;
+    for (int round = 0; round < rounds; ++round) {
       refit = refit_with(robot_, rows_, start_, fitted_, e);
       const std::vector<bool> now = in_full(refit.fit.weight);
       if (now == counts) break;
@@ -377,7 +379,8 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
     if (refit.fit.weight[k] < 1) odd.push_back(k);
   }
   if (!odd.empty()) {
-    std::vector<std::vector<bool>> tries{std::vector<bool>(rows_.size(), true)};
+    std::vector<std::vector<bool>> tries;
+    if (rows_.size() <= 300) tries.emplace_back(rows_.size(), true);
     const GapSystem everything =
         gap_system(robot_, rows_, std::vector<bool>(rows_.size(), true), extended(nuisance_of(refit), &best),
                    fitted_, CandidateSet{candidates_.set, {}, {}, {}, false});
@@ -421,7 +424,7 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
   // Where something is left its size is the noise by which names are judged.
   if (best.unnamed) {
     const Remainder left = remainder(*best.search, best.solution);
-    const double dof = best.system->numbers - static_cast<double>(left.basis.cols());
+    const double dof = best.system->numbers - left.fitted_numbers;
     const double scale2 = noise2 * left.chi2() / std::max(1.0, dof);
     if (scale2 > 1.1 * noise2) {
       best = search(at, best.system->counts, scale2, &best);

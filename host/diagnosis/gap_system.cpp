@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/blas.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -22,8 +24,7 @@ double rank(const Eigen::MatrixXd& projected, const std::vector<Eigen::Index>& c
     const Eigen::Index c = columns[static_cast<std::size_t>(k)];
     scaled.col(k) = projected.col(c) / whole.col(whole_index[static_cast<std::size_t>(c)]).norm();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled,
-                                                             Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram(scaled), Eigen::EigenvaluesOnly);
   return static_cast<double>((eigen.eigenvalues().array() > nothing_left * nothing_left).count());
 }
 
@@ -55,7 +56,8 @@ const PlaceColumn& place_column(const GapSystem& system, Place place) {
 }
 
 void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd projected = columns - system.nuisance * (system.nuisance.transpose() * columns);
+  const Eigen::MatrixXd projected =
+      columns - product(system.nuisance, transposed_product(system.nuisance, columns));
   const Eigen::Index first = system.columns.cols();
   std::vector<Eigen::Index> kept;
   for (Eigen::Index c = 0; c < columns.cols(); ++c) {
@@ -112,7 +114,7 @@ GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& row
     const Eigen::Index c = moved + asked + static_cast<Eigen::Index>(p);
     out.places.push_back({places[p], lin.derivative.col(c) / units[c]});
   }
-  const auto candidate_columns = lin.derivative.middleCols(moved, asked);
+  const Eigen::MatrixXd candidate_columns = lin.derivative.middleCols(moved, asked);
   out.residual = lin.residual;
   for (Eigen::Index p = 0; p < asked; ++p) {
     const double value = all.parameters[static_cast<std::size_t>(p)].get(estimate.set);
@@ -121,7 +123,7 @@ GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& row
   out.residual -= out.nuisance * (out.nuisance.transpose() * out.residual);
 
   const Eigen::MatrixXd projected =
-      candidate_columns - out.nuisance * (out.nuisance.transpose() * candidate_columns);
+      candidate_columns - product(out.nuisance, transposed_product(out.nuisance, candidate_columns));
   // One column per parameter; forms of a name share them.
   std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
   std::vector<Eigen::Index> kept;
@@ -155,7 +157,7 @@ GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& row
     block.parameters = rank(out.columns, block.columns, candidate_columns, kept);
     // Every arm bends: what the paper's model has needs no more than its BIC.
     const bool usual = block.id.effect == Effect::joint_compliance || block.id.effect == Effect::link_gravity;
-    block.margin = usual ? 0 : telling_bic;
+    block.margin = usual ? 0 : least_gain;
     if (candidate.prior_rad > 0) {
       block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
       block.parameters = 0;

@@ -15,6 +15,9 @@
 
 namespace flexcomp::host {
 
+/// What an effect must gain in BIC to be named at all: a little more than decisive, for some two hundred names are tried.
+constexpr double least_gain = 12;
+
 /// Columns that enter and leave together, and what they cost.
 struct Block {
   EffectId id;

@@ -163,7 +163,11 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
   }
 
   Estimate estimate{model.set, start.f, start.e};
-  out.fit = fit(estimate, out.fitted, rows, robot, {});
+  EstimatorOptions options;
+  options.spectrum = false;
+  // On the way to a curve's prior no more than near the minimum.
+  if (!curve_ranges.empty()) options.largest_iterations = 8;
+  out.fit = fit(estimate, out.fitted, rows, robot, options);
   // Empirical Bayes: the coefficients of a curve are as large as they turn out to be.
   for (int round = 0; round < 2 && !curve_ranges.empty(); ++round) {
     for (const auto& [from, to] : curve_ranges) {
@@ -179,7 +183,8 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
           std::clamp(std::sqrt(square / static_cast<double>(to - from)), 1e-6, wide_curve_rad);
       for (std::size_t p = from; p < to; ++p) out.fitted.prior[p].tolerance = size;
     }
-    out.fit = fit(out.fit.estimate, out.fitted, rows, robot, {});
+    if (round == 1) options.largest_iterations = EstimatorOptions().largest_iterations;
+    out.fit = fit(out.fit.estimate, out.fitted, rows, robot, options);
   }
   for (const std::size_t t : curve_terms) {
     const Term<double> term = out.fit.estimate.set.terms[t];

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/blas.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -51,31 +53,31 @@ Remainder remainder(const SubsetSearch& search, const Scored& solution) {
     count += static_cast<Eigen::Index>(system.blocks[b].columns.size());
   Eigen::MatrixXd added(system.columns.rows(), count);
   Eigen::Index at = 0;
-  bool prior = false;
+  Eigen::VectorXd precision(count);
   for (const std::size_t b : solution.blocks) {
-    prior = prior || system.blocks[b].precision > 0;
     for (const Eigen::Index c : system.blocks[b].columns) {
       out.residual -= system.columns.col(c) * solution.solution[at];
+      precision[at] = out.noise_scale2 * search.precision_of(system.blocks[b], c);
       added.col(at++) = system.columns.col(c);
     }
   }
-  if (count > 0) {
-    // Columns that the others span would give the basis directions of rounding.
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(added);
-    const Eigen::Index rank = qr.rank();
-    const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(added.rows(), rank);
-    out.basis.resize(added.rows(), system.nuisance.cols() + rank);
-    out.basis << system.nuisance, q;
-    out.residual -= q * (q.transpose() * out.residual);
-  } else {
-    out.basis = system.nuisance;
-  }
+  out.basis = system.nuisance;
+  out.fitted_numbers = static_cast<double>(system.nuisance.cols());
+  if (count == 0) return out;
+  // basis basis^T is the matrix that takes the residuals to their fit; with priors its trace counts what they leave free.
+  Eigen::MatrixXd normal = gram(added);
+  normal.diagonal() += precision;
+  if (!factor_in_place(normal)) return out;
+  orthonormalise(normal, added);
+  out.fitted_numbers += added.squaredNorm();
+  out.basis.resize(added.rows(), system.nuisance.cols() + count);
+  out.basis << system.nuisance, added;
   return out;
 }
 
 std::vector<PlaceShare> place_shares(const GapSystem& system, const Remainder& left) {
   std::vector<PlaceShare> shares;
-  const double dof = system.numbers - static_cast<double>(left.basis.cols());
+  const double dof = system.numbers - left.fitted_numbers;
   const double beyond = left.chi2() - dof;
   for (const PlaceColumn& place : system.places) {
     const Scalar s = scalar(system, left, place.column);
@@ -314,9 +316,8 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
       // A coupling of the direction of one joint to another is nobody's.
       if (set.size() == 1 && of[set[0]].kind == Covariate::direction && of[set[0]].joint == j) continue;
       const Scalar& s = joints[j - 1];
-      const Eigen::MatrixXd w = s.basis * phi;
-      const Eigen::MatrixXd a =
-          (phi.transpose() * s.square.asDiagonal() * phi - w.transpose() * w) / left.noise_scale2;
+      const Eigen::MatrixXd weighted = s.square.cwiseSqrt().asDiagonal() * phi;
+      const Eigen::MatrixXd a = (gram(weighted) - gram(product(s.basis, phi))) / left.noise_scale2;
       const Eigen::VectorXd b = phi.transpose() * s.product / left.noise_scale2;
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
       const Eigen::VectorXd along = eigen.eigenvectors().transpose() * b;

@@ -19,8 +19,9 @@ namespace flexcomp::host {
 
 /// What a solution leaves.
 struct Remainder {
-  Eigen::VectorXd residual;  ///< whitened
-  Eigen::MatrixXd basis;     ///< orthonormal: nuisance and blocks
+  Eigen::VectorXd residual;   ///< whitened
+  Eigen::MatrixXd basis;      ///< of nuisance and blocks: basis basis^T takes residuals to their fit
+  double fitted_numbers = 0;  ///< trace of that
   double noise_scale2 = 1;
   double chi2() const { return residual.squaredNorm() / noise_scale2; }
 };

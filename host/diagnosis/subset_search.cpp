@@ -1,9 +1,10 @@
 #include "diagnosis/subset_search.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "diagnosis/blas.hpp"
 
 namespace flexcomp::host {
 
@@ -49,9 +50,7 @@ bool is_part_of(const Block& function, const EffectId& id) {
 
 SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2)
     : system_(system), scale2_(noise_scale2), log_n_(std::log(std::max(2.0, system.numbers))) {
-  gram_ = Eigen::MatrixXd::Zero(system.columns.cols(), system.columns.cols());
-  gram_.selfadjointView<Eigen::Lower>().rankUpdate(system.columns.transpose(), 1 / scale2_);
-  gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
+  gram_ = gram(system.columns) / scale2_;
   product_ = system.columns.transpose() * system.residual / scale2_;
   total_ = system.residual.squaredNorm() / scale2_ * (1 + 1e-9);
 }
@@ -72,8 +71,8 @@ void SubsetSearch::extend() {
   const Eigen::Index had = gram_.cols();
   const Eigen::Index has = system_.columns.cols();
   gram_.conservativeResize(has, has);
-  const auto fresh = system_.columns.rightCols(has - had);
-  gram_.bottomRows(has - had) = fresh.transpose() * system_.columns / scale2_;
+  const Eigen::MatrixXd fresh = system_.columns.rightCols(has - had);
+  gram_.bottomRows(has - had) = transposed_product(fresh, system_.columns) / scale2_;
   gram_.topRightCorner(had, has - had) = gram_.bottomLeftCorner(has - had, had).transpose();
   product_.conservativeResize(has);
   product_.tail(has - had) = fresh.transpose() * system_.residual / scale2_;
@@ -133,12 +132,14 @@ Scored SubsetSearch::score(const Subset& subset) const {
     for (const Eigen::Index c : system_.blocks[b].columns) prior[at++] = precision_of(system_.blocks[b], c);
   }
   normal.diagonal() += prior;
-  const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-  if (factor.info() != Eigen::Success) {
+  if (!factor_in_place(normal)) {
     out.gain = minus_infinity;
     return out;
   }
-  out.solution = factor.solve(right);
+  Eigen::MatrixXd solved = right;
+  solve_lower(normal, solved);
+  solve_lower_transposed(normal, solved);
+  out.solution = solved.col(0);
   out.chi2_gain = out.solution.dot(right);
   // More than there is: the columns are one another's to rounding.
   if (!(out.chi2_gain <= total_)) {
@@ -152,7 +153,7 @@ Scored SubsetSearch::score(const Subset& subset) const {
     const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
     if (block.precision > 0) {
       for (Eigen::Index k = at; k < at + size; ++k)
-        out.gain -= std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+        out.gain -= std::log(std::pow(normal(k, k), 2) / block.precision);
     }
     // A scan has looked at many positions of a function with few numbers: they count besides the evidence.
     out.gain -= block.parameters * log_n_;
@@ -178,19 +179,19 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
   }
   const Eigen::Index n = static_cast<Eigen::Index>(index.size());
   Eigen::MatrixXd reduced(n, gram_.cols());  // L^-1 G[S, :]
-  Eigen::VectorXd done = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd done = Eigen::MatrixXd::Zero(n, 1);
   if (n > 0) {
     Eigen::MatrixXd normal(n, n);
     for (Eigen::Index i = 0; i < n; ++i) {
       reduced.row(i) = gram_.row(index[static_cast<std::size_t>(i)]);
-      done[i] = product_[index[static_cast<std::size_t>(i)]];
+      done(i, 0) = product_[index[static_cast<std::size_t>(i)]];
       for (Eigen::Index k = 0; k < n; ++k)
         normal(i, k) = gram_(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(k)]);
       normal(i, i) += prior[static_cast<std::size_t>(i)];
     }
-    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-    factor.matrixL().solveInPlace(reduced);
-    factor.matrixL().solveInPlace(done);
+    if (!factor_in_place(normal)) return std::vector<double>(system_.blocks.size(), minus_infinity);
+    solve_lower(normal, reduced);
+    solve_lower(normal, done);
   }
   std::vector<double> gains(system_.blocks.size(), minus_infinity);
   for (std::size_t b = 0; b < system_.blocks.size(); ++b) {
@@ -200,26 +201,28 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
     const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
     Eigen::MatrixXd normal(size, size);
     Eigen::VectorXd right(size);
+    Eigen::MatrixXd taken(n, size);
+    for (Eigen::Index i = 0; i < size; ++i)
+      taken.col(i) = reduced.col(block.columns[static_cast<std::size_t>(i)]);
+    const Eigen::MatrixXd carried = gram(taken);
     bool is_spanned = false;
     for (Eigen::Index i = 0; i < size; ++i) {
       const Eigen::Index ci = block.columns[static_cast<std::size_t>(i)];
-      right[i] = product_[ci] - (n > 0 ? reduced.col(ci).dot(done) : 0);
-      for (Eigen::Index k = 0; k <= i; ++k) {
-        const Eigen::Index ck = block.columns[static_cast<std::size_t>(k)];
-        normal(i, k) = normal(k, i) = gram_(ci, ck) - (n > 0 ? reduced.col(ci).dot(reduced.col(ck)) : 0);
-      }
+      right[i] = product_[ci] - (n > 0 ? taken.col(i).dot(done.col(0)) : 0);
+      for (Eigen::Index k = 0; k < size; ++k)
+        normal(i, k) = gram_(ci, block.columns[static_cast<std::size_t>(k)]) - carried(i, k);
       if (normal(i, i) < spanned * gram_(ci, ci) && size == 1) is_spanned = true;
       normal(i, i) += precision_of(block, ci);
     }
     if (is_spanned) continue;
-    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-    if (factor.info() != Eigen::Success) continue;
-    const Eigen::VectorXd solution = factor.solve(right);
+    if (!factor_in_place(normal)) continue;
+    Eigen::MatrixXd solution = right;
+    solve_lower(normal, solution);
+    double gain = solution.squaredNorm();
+    solve_lower_transposed(normal, solution);
     if (block.positive && (solution.array() < 0).any()) continue;
-    double gain = solution.dot(right);
     if (block.precision > 0) {
-      for (Eigen::Index k = 0; k < size; ++k)
-        gain -= std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+      for (Eigen::Index k = 0; k < size; ++k) gain -= std::log(std::pow(normal(k, k), 2) / block.precision);
     }
     gains[b] = gain - block.parameters * log_n_;
   }
@@ -302,7 +305,7 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
 }
 
 Eigen::VectorXd SubsetSearch::largest_single_gains(const Eigen::MatrixXd& residuals) const {
-  const Eigen::MatrixXd products = system_.columns.transpose() * residuals / scale2_;
+  const Eigen::MatrixXd products = transposed_product(system_.columns, residuals) / scale2_;
   Eigen::VectorXd largest = Eigen::VectorXd::Constant(residuals.cols(), minus_infinity);
   for (const Block& block : system_.blocks) {
     const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
@@ -315,14 +318,12 @@ Eigen::VectorXd SubsetSearch::largest_single_gains(const Eigen::MatrixXd& residu
             gram_(block.columns[static_cast<std::size_t>(i)], block.columns[static_cast<std::size_t>(k)]);
       normal(i, i) += precision_of(block, block.columns[static_cast<std::size_t>(i)]);
     }
-    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-    if (factor.info() != Eigen::Success) continue;
+    if (!factor_in_place(normal)) continue;
     double cost = block.parameters * log_n_;
     if (block.precision > 0) {
-      for (Eigen::Index k = 0; k < size; ++k)
-        cost += std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+      for (Eigen::Index k = 0; k < size; ++k) cost += std::log(std::pow(normal(k, k), 2) / block.precision);
     }
-    factor.matrixL().solveInPlace(right);
+    solve_lower(normal, right);
     for (Eigen::Index c = 0; c < right.cols(); ++c) {
       if (block.positive && size == 1 && right(0, c) < 0) continue;
       largest[c] = std::max(largest[c], right.col(c).squaredNorm() - cost);

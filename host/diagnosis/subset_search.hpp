@@ -51,6 +51,9 @@ class SubsetSearch {
   /// Takes in blocks that were added to the system since.
   void extend();
 
+  /// Prior precision of a coefficient, per square of its unit.
+  double precision_of(const Block& block, Eigen::Index column) const;
+
   const GapSystem& system() const { return system_; }
   double noise_scale2() const { return scale2_; }
   double log_n() const { return log_n_; }
@@ -59,8 +62,6 @@ class SubsetSearch {
   double margins(const Subset& subset) const;
 
  private:
-  double precision_of(const Block& block, Eigen::Index column) const;
-
   const GapSystem& system_;
   double scale2_;
   double log_n_;

@@ -160,16 +160,22 @@ class Descent {
   Quadratic quadratic(const Point& point, const std::vector<double>& weight) const {
     const Eigen::Index n = static_cast<Eigen::Index>(unknowns_.count());
     Quadratic q{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), least_ - values(point.estimate)};
-    if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 1; })) {
-      q.normal.selfadjointView<Eigen::Lower>().rankUpdate(point.lin.derivative.transpose());
-      q.gradient = point.lin.derivative.transpose() * point.lin.residual;
-    } else {
-      Eigen::VectorXd root(point.lin.residual.size());
-      for (std::size_t k = 0; k < rows_.size(); ++k)
-        root.segment<6>(6 * static_cast<Eigen::Index>(k)).setConstant(std::sqrt(weight[k]));
-      const Eigen::MatrixXd weighted = root.asDiagonal() * point.lin.derivative;
-      q.normal.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
-      q.gradient = weighted.transpose() * root.cwiseProduct(point.lin.residual);
+    // Row by row over the columns that it has: of a curve's coefficients a pose touches four.
+    std::vector<Eigen::Index> touched;
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const auto block = point.lin.derivative.middleRows<6>(6 * static_cast<Eigen::Index>(k));
+      touched.clear();
+      for (Eigen::Index c = 0; c < n; ++c) {
+        if ((block.col(c).array() != 0).any()) touched.push_back(c);
+      }
+      const Vector6<double> residual =
+          weight[k] * point.lin.residual.segment<6>(6 * static_cast<Eigen::Index>(k));
+      for (std::size_t i = 0; i < touched.size(); ++i) {
+        const Vector6<double> column = block.col(touched[i]);
+        q.gradient[touched[i]] += column.dot(residual);
+        for (std::size_t j = 0; j <= i; ++j)
+          q.normal(touched[i], touched[j]) += weight[k] * column.dot(block.col(touched[j]));
+      }
     }
     q.normal.diagonal() += precision_;
     q.gradient += precision_.cwiseProduct(expected_ - values(point.estimate));
@@ -327,7 +333,7 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
     out.interval.push_back(
         allowed_interval(unbounded, sigma, unknowns.prior_of(p).least, out.at_bound.back()));
   }
-  if (columns > frames) {
+  if (options.spectrum && columns > frames) {
     out.singular_values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(without_frames(normal, frames))
                               .eigenvalues()
                               .cwiseMax(0)

@@ -16,6 +16,8 @@ struct EstimatorOptions {
   double upsilon = 10;  ///< step length coefficient of the damping; 4 … 100 all work (the paper)
   int largest_iterations = 200;
   bool robust = true;  ///< false: every row counts in full
+  bool spectrum =
+      true;  ///< false: Fit::singular_values are not wanted (they cost the most where unknowns are many)
   /// Called after each accepted step with the iteration and the cost; may be empty.
   std::function<void(int, double)> progress;
 };
