@@ -168,6 +168,12 @@ Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector
   Fitted out;
   out.unknowns = unknowns;
   out.unknowns.prior = prior_knowledge(start.set, unknowns.parameters, true, {});
+  // A load ten times off and a compliance ten times less are nearly one and the same, and would run off together.
+  for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
+    const flexcomp::Term<double>& t = start.set.terms[unknowns.parameters[p].terms.front()];
+    if (t.effect != Effect::payload_error) continue;
+    out.unknowns.prior[p].tolerance = t.place.slot == flexcomp::slot::mass ? robot.nominal.payload_kg : 0.1;
+  }
   EstimatorOptions plain_squares;
   plain_squares.robust = false;
   const Fit result = fit(start, out.unknowns, rows, robot, plain_squares);

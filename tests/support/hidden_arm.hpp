@@ -64,6 +64,8 @@ struct Bump {
 /// What is wrong with the data of a rough case.
 enum class Roughness { nothing, outliers, slip, drift, no_time, no_temperature, no_moves };
 std::string name(Roughness roughness);
+/// Whether an effect cannot be seen without the columns that this roughness takes away.
+bool needs_what_is_missing(flexcomp::Effect effect, Roughness roughness);
 
 struct Case {
   Row row = Row::none;
