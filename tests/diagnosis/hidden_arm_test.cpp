@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -221,7 +222,10 @@ TEST(Oracle, ExplainsTheDataDownToTheNoise) {
         blind = blind || hidden::needs_what_is_missing(e.id.effect, c.roughness);
       if (blind) continue;
       const judging::Oracle oracle = judging::oracle_of(c);
-      EXPECT_TRUE(oracle.converged) << hidden::name(row) << seed << " " << c.what;
+      // A payload error that the data cannot show may leave a flat valley.
+      const bool shown = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
+                                     [](const judging::Hidden& h) { return h.detectable(); });
+      EXPECT_TRUE(oracle.converged || !shown) << hidden::name(row) << seed << " " << c.what;
       const double n = measured_numbers(c.clean_train());
       EXPECT_TRUE(chi_square_is_usual(oracle.chi2, n - 40))
           << hidden::name(row) << seed << " " << oracle.chi2;

@@ -105,6 +105,10 @@ std::string group_of(const hidden::Case& c) {
       if (c.outside->covariate[1] != flexcomp::Covariate::reading)
         return covariate_name(c.outside->covariate[1], 0) + " and an angle";
       return c.outside->formula.substr(0, 4) == "bump" ? "a bump of two joints" : "two joints";
+    case hidden::Row::local:
+      return c.inside_the_bump < 3
+                 ? "1 or 2 poses inside"
+                 : (c.inside_the_bump < 6 ? "3 to 5 poses inside" : "6 or more poses inside");
     default:
       return c.arm_name;
   }

@@ -168,11 +168,16 @@ Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector
   Fitted out;
   out.unknowns = unknowns;
   out.unknowns.prior = prior_knowledge(start.set, unknowns.parameters, true, {});
-  // A load ten times off and a compliance ten times less are nearly one and the same, and would run off together.
+  // Directions that the data leave open must not run off: a centre of mass on axis 6 with no stiffness there, a curve
+  // beyond the last reading. How large such things are is known to whoever drew them.
   for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
     const flexcomp::Term<double>& t = start.set.terms[unknowns.parameters[p].terms.front()];
-    if (t.effect != Effect::payload_error) continue;
-    out.unknowns.prior[p].tolerance = t.place.slot == flexcomp::slot::mass ? robot.nominal.payload_kg : 0.1;
+    if (t.effect == Effect::payload_error) {
+      const bool mass = t.place.slot == flexcomp::slot::mass;
+      out.unknowns.prior[p].tolerance = mass ? 0.2 * robot.nominal.payload_kg : 0.02;
+    } else if (t.effect == Effect::joint_curve && unknowns.parameters[p].value) {
+      out.unknowns.prior[p].tolerance = 5e-4;
+    }
   }
   EstimatorOptions plain_squares;
   plain_squares.robust = false;

@@ -77,7 +77,7 @@ std::string csv_line(const Outcome& o) {
 
 /// A case whose answer a reader wants to look into.
 bool is_remarkable(const Outcome& o) {
-  if (o.wrong || !o.oracle_converged) return true;
+  if (o.wrong || (o.detectable && !o.oracle_converged)) return true;
   if (o.right) return false;
   return o.decidable || (o.detectable && !o.beaten() && !o.listed);
 }
