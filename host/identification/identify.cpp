@@ -9,6 +9,7 @@
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
 #include "flexcomp/forward.hpp"
+#include "identification/fitted_calibration.hpp"
 #include "identification/identifiability.hpp"
 #include "units.hpp"
 
@@ -58,27 +59,6 @@ void refuse_the_implausible(const RobotFile& robot, const std::vector<Observatio
   throw InputError(source, 0, "x_mm y_mm z_mm",
                    fmt::format("residuals to the nominal {} below {:.0f} mm", robot.name, limit * 1e3),
                    fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
-}
-
-/// Terms that are neither fitted nor given say nothing: they are left out of the calibration.
-void keep_what_was_identified(Calibration& calibration, const TermSet& set, const Unknowns& fitted,
-                              const Eigen::VectorXd& sigma) {
-  std::vector<double> of_term(set.terms.size(), std::nan(""));
-  std::vector<bool> kept(set.terms.size(), false);
-  for (std::size_t t = 0; t < set.terms.size(); ++t) {
-    kept[t] = set.terms[t].coefficient != 0;  // fixed: given, hence without uncertainty
-  }
-  for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
-    for (const std::size_t t : fitted.parameters[p].terms) {
-      of_term[t] = sigma[static_cast<Eigen::Index>(fitted.frames.size() + p)];
-      kept[t] = true;
-    }
-  }
-  for (std::size_t t = 0; t < set.terms.size(); ++t) {
-    if (!kept[t]) continue;
-    calibration.terms.terms.push_back(set.terms[t]);
-    calibration.sigma.push_back(of_term[t]);
-  }
 }
 
 /// Takes fixed parameters out of those to be fitted and sets their values.
@@ -150,7 +130,6 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
     out.fit.estimate = start;
   }
 
-  const Eigen::VectorXd sigma_units = out.fit.covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd& s = out.fit.singular_values;
   if (s.size() > 0 && s[s.size() - 1] > 0) {
     out.condition = s[0] / s[s.size() - 1];
@@ -170,13 +149,8 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   }
   if (fitted.count() > 0) out.pure_error = pure_error(in_full, out.fit.chi2, out.fit.degrees_of_freedom);
 
-  const Eigen::VectorXd units = units_of(fitted, out.fit.estimate.set);
-  keep_what_was_identified(out.calibration, out.fit.estimate.set, fitted, sigma_units.cwiseProduct(units));
-  out.calibration.covariance = CovarianceFactor{
-      names_of(fitted), units.asDiagonal() * Eigen::MatrixXd(out.fit.covariance.llt().matrixL())};
-  if (fit_frames_too) {
-    out.calibration.frames = MeasurementFrames{Frame::of(out.fit.estimate.f), Frame::of(out.fit.estimate.e)};
-  } else {
+  out.calibration = fitted_calibration(out.fit, fitted, robot);
+  if (!fit_frames_too) {
     // B is the small step from the constructed base frame to the robot's own; anything larger is another frame (F).
     double shift = 0;
     double turn = 0;
@@ -193,15 +167,10 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
     }
   }
   out.calibration.confounded = out.known.confounded;
-  for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
-    if (out.fit.at_bound[p])
-      out.calibration.at_bound.push_back({fitted.parameters[p].name, out.fit.interval[p].high});
-  }
   out.calibration.residuals = {{"before_mean_mm", out.before.nominal_frames.mean_m * 1e3},
                                {"after_mean_mm", out.after.mean_m * 1e3},
                                {"after_rms_mm", out.after.rms_m * 1e3},
                                {"after_max_mm", out.after.max_m * 1e3}};
-  stamp(out.calibration, robot);
 
   if (!out.known.missing.empty()) {
     std::string list;

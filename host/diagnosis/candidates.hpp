@@ -1,0 +1,57 @@
+/// \file
+/// Every name of the catalogue that these data may be asked about, as columns beside the model's own.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_CANDIDATES_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_CANDIDATES_HPP
+
+#include <cstddef>
+#include <vector>
+
+#include "catalogue/catalogue.hpp"
+#include "diagnosis/diagnose.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+
+/// One form of one effect: the parameters that are fitted together. A curve has a form per number of coefficients, a
+/// wrong payload one for its mass, one for its centre and one for both.
+struct Candidate {
+  EffectId id;
+  std::vector<std::size_t> parameters;  ///< indices into CandidateSet::parameters
+  std::size_t first = 0;                ///< of these, the first one of the whole effect
+  bool positive = false;                ///< physics allows no negative coefficient
+  /// reflector_slip: the columns count from here on only
+  bool steps = false;
+};
+
+struct CandidateSet {
+  /// The set that was given, and behind it every effect of the list with coefficients zero.
+  TermSet set;
+  std::vector<Parameter> parameters;  ///< of the effects only
+  std::vector<Candidate> list;
+  std::vector<NotTestable> not_testable;
+  bool has_slip =
+      false;  ///< the last three parameters move the measured point, from after_s on (before all rows here)
+};
+
+/// What the context of the rows lets us ask for.
+struct Testable {
+  bool payload = false;      ///< some load that is not zero
+  bool temperature = false;  ///< varies
+  bool time = false;         ///< varies
+  bool relative_speed = false;
+  std::array<bool, joint_count> direction{};  ///< both directions occur
+};
+Testable testable(const std::vector<Observation>& rows, const ContextColumns& columns);
+
+/// All of them but those that `set` has already.
+CandidateSet candidates(const RobotFile& robot, const std::vector<Observation>& rows,
+                        const ContextColumns& columns, const TermSet& set);
+
+/// Two forms of one name: the same effect at the same place, whatever its size or number of coefficients.
+bool same_name(const EffectId& a, const EffectId& b);
+
+}  // namespace flexcomp::host
+
+#endif

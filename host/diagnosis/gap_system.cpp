@@ -1,0 +1,148 @@
+#include "diagnosis/gap_system.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace flexcomp::host {
+
+namespace {
+
+/// Less than this share of a column left after the projection: the data cannot speak of it (effects.md).
+constexpr double nothing_left = 1e-3;
+
+std::vector<Place> all_places() {
+  std::vector<Place> places;
+  for (std::uint8_t link = 1; link <= joint_count; ++link) {
+    for (std::uint8_t s = slot::theta; s <= slot::gamma; ++s) places.push_back({link, s});
+  }
+  for (const std::uint8_t b : {body::base, body::tool}) {
+    for (std::uint8_t s = slot::x; s <= slot::rz; ++s) places.push_back({b, s});
+  }
+  return places;
+}
+
+}  // namespace
+
+Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_row) {
+  Eigen::VectorXd out(place.size());
+  for (Eigen::Index k = 0; k < per_row.size(); ++k)
+    out.segment<6>(6 * k) = place.segment<6>(6 * k) * per_row[k];
+  return out;
+}
+
+const PlaceColumn& place_column(const GapSystem& system, Place place) {
+  for (const PlaceColumn& p : system.places) {
+    if (p.place == place) return p;
+  }
+  throw std::logic_error("a place without a column");
+}
+
+void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
+  const Eigen::MatrixXd projected = columns - system.nuisance * (system.nuisance.transpose() * columns);
+  const Eigen::Index first = system.columns.cols();
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    const double whole = columns.col(c).norm();
+    if (whole > 0 && projected.col(c).norm() > nothing_left * whole) kept.push_back(c);
+  }
+  if (kept.empty()) return;
+  system.columns.conservativeResize(columns.rows(), first + static_cast<Eigen::Index>(kept.size()));
+  block.columns.clear();
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const Eigen::Index to = first + static_cast<Eigen::Index>(k);
+    system.columns.col(to) = projected.col(kept[k]);
+    block.columns.push_back(to);
+  }
+  system.blocks.push_back(std::move(block));
+}
+
+GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& rows,
+                     const std::vector<bool>& counts, const Estimate& estimate, const Unknowns& fitted,
+                     const CandidateSet& all) {
+  GapSystem out;
+  out.rows = rows.size();
+  out.counts = counts;
+  // Places are terms of their own: constants at zero, which move nothing.
+  Estimate with_places = estimate;
+  Unknowns everything = fitted;
+  everything.parameters.insert(everything.parameters.end(), all.parameters.begin(), all.parameters.end());
+  const std::vector<Place> places = all_places();
+  for (const Place place : places) {
+    Term<double> t;
+    t.place = place;
+    t.coefficient = 0;
+    everything.parameters.push_back(
+        {geometric_name(place), place_unit(place), {with_places.set.terms.size()}, {}});
+    with_places.set.terms.push_back(t);
+  }
+  const auto model = prepare(with_places.set, robot, "diagnosis");
+  Linearised lin = linearised(with_places, *model, rows, everything);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Eigen::Index at = 6 * static_cast<Eigen::Index>(k);
+    if (counts[k]) {
+      out.numbers += rows[k].has_orientation ? 6 : 3;
+      continue;
+    }
+    lin.residual.segment<6>(at).setZero();
+    lin.derivative.middleRows<6>(at).setZero();
+  }
+  const Eigen::Index moved = static_cast<Eigen::Index>(fitted.count());
+  const Eigen::Index asked = static_cast<Eigen::Index>(all.parameters.size());
+  out.nuisance = Eigen::HouseholderQR<Eigen::MatrixXd>(lin.derivative.leftCols(moved)).householderQ() *
+                 Eigen::MatrixXd::Identity(lin.derivative.rows(), moved);
+  const Eigen::VectorXd units = units_of(everything, with_places.set);
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    const Eigen::Index c = moved + asked + static_cast<Eigen::Index>(p);
+    out.places.push_back({places[p], lin.derivative.col(c) / units[c]});
+  }
+  const auto candidate_columns = lin.derivative.middleCols(moved, asked);
+  out.residual = lin.residual;
+  for (Eigen::Index p = 0; p < asked; ++p) {
+    const double value = all.parameters[static_cast<std::size_t>(p)].get(estimate.set);
+    if (value != 0) out.residual += candidate_columns.col(p) * (value / units[moved + p]);
+  }
+  out.residual -= out.nuisance * (out.nuisance.transpose() * out.residual);
+
+  const Eigen::MatrixXd projected =
+      candidate_columns - out.nuisance * (out.nuisance.transpose() * candidate_columns);
+  // One column per parameter; forms of a name share them.
+  std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index p = 0; p < asked; ++p) {
+    const double whole = candidate_columns.col(p).norm();
+    if (!(whole > 0) || !(projected.col(p).norm() > nothing_left * whole)) continue;
+    column_of[static_cast<std::size_t>(p)] = static_cast<Eigen::Index>(kept.size());
+    kept.push_back(p);
+  }
+  out.columns.resize(projected.rows(), static_cast<Eigen::Index>(kept.size()));
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    out.columns.col(static_cast<Eigen::Index>(k)) = projected.col(kept[k]);
+  for (std::size_t c = 0; c < all.list.size(); ++c) {
+    const Candidate& candidate = all.list[c];
+    if (candidate.steps) continue;  // a scan makes blocks of it
+    Block block;
+    block.id = candidate.id;
+    block.candidate = c;
+    block.positive = candidate.positive;
+    for (const std::size_t p : candidate.parameters) {
+      if (column_of[p] < 0) continue;
+      block.columns.push_back(column_of[p]);
+      block.fitted.push_back(p);
+    }
+    if (block.columns.empty()) {
+      const bool known = std::any_of(out.dropped.begin(), out.dropped.end(),
+                                     [&](const EffectId& id) { return same_name(id, candidate.id); });
+      if (!known) out.dropped.push_back(candidate.id);
+      continue;
+    }
+    block.parameters = static_cast<double>(block.columns.size());
+    // The sum of a curve's splines is the offset of its joint.
+    if (candidate.id.effect == Effect::joint_curve && block.parameters > 1) block.parameters -= 1;
+    out.blocks.push_back(std::move(block));
+  }
+  return out;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,224 @@
+#include "diagnosis/refit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "flexcomp/forward.hpp"
+
+#include "identification/fitted_calibration.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+/// A curve's coefficients before anything is known of them, rad: a few times what bad gears have.
+constexpr double wide_curve_rad = 1e-3;
+
+/// What the pieces say of one joint's curve.
+struct CurveParts {
+  std::size_t size = 0;
+  bool whole = false;  ///< a smooth curve: every coefficient is free
+  std::vector<const LocalCurve*> locals;
+};
+
+bool is_free(const CurveParts& parts, std::size_t coefficient) {
+  if (parts.whole) return true;
+  const double at = 2 * pi * static_cast<double>(coefficient) / static_cast<double>(parts.size);
+  return std::any_of(parts.locals.begin(), parts.locals.end(), [&](const LocalCurve* c) {
+    // All whose knot lies in the inner half of the spline's support.
+    return std::abs(std::remainder(at - c->centre_rad, 2 * pi)) <
+           1.5 * 2 * pi / static_cast<double>(c->knots);
+  });
+}
+
+/// The smooth function as a table that the core reads: its values at nodes of two variables.
+void add_table_of(const Piece& piece, const Explanation& found, const RobotFile& robot,
+                  ParametricModel& model) {
+  constexpr std::size_t nodes = 25;
+  EffectId id{.effect = Effect::unnamed};
+  id.place = piece.function->place;
+  std::vector<const Variable*> of;
+  for (const std::size_t v : piece.function->of) of.push_back(&found.variables[v]);
+  if (std::any_of(of.begin(), of.end(), [](const Variable* v) { return v->is_order; })) return;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (side < of.size()) {
+      id.covariate[side] = of[side]->kind;
+      id.covariate_joint[side] = of[side]->joint;
+      const double low = of[side]->value.minCoeff();
+      const double high = of[side]->value.maxCoeff();
+      const std::size_t count = of[side]->kind == Covariate::reading ? nodes : 5;
+      for (std::size_t k = 0; k < count; ++k)
+        id.node[side].push_back(low + (high - low) * static_cast<double>(k) / static_cast<double>(count - 1));
+    } else {
+      // Of one variable: the same at every load.
+      id.covariate[side] = Covariate::payload;
+      id.node[side] = {0, 1};
+    }
+  }
+  add_effect(model, id, robot.nominal);
+  const Term<double>& term = model.set.terms.back();
+  double* values =
+      model.set.values.data() + model.set.tables[term.table].offset + id.node[0].size() + id.node[1].size();
+  const std::size_t rows = id.node[0].size();
+  const std::size_t columns = id.node[1].size();
+  std::vector<Eigen::VectorXd> at(of.size(), Eigen::VectorXd(static_cast<Eigen::Index>(rows * columns)));
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      const Eigen::Index cell = static_cast<Eigen::Index>(r * columns + c);
+      at[0][cell] = id.node[0][r];
+      if (at.size() > 1) at[1][cell] = id.node[1][c];
+    }
+  }
+  const Eigen::MatrixXd phi = members(of, at);
+  // Columns that the projection took away have no coefficient: then the numbers differ, and the function is as it was.
+  if (phi.cols() != piece.value.size()) return;
+  const Eigen::VectorXd v = phi * piece.value;
+  for (Eigen::Index k = 0; k < v.size(); ++k) values[k] = v[k];
+}
+
+/// Turns a curve's mean over the readings that occur into the offset of its joint: the pose stays what it is.
+void centre_curve(TermSet& set, const Term<double>& term, const RobotFile& robot) {
+  const Table& table = set.tables[term.table];
+  double* c = set.values.data() + table.offset;
+  const JointLimits& limits = robot.nominal.limits[term.joint];
+  double mean = 0;
+  constexpr int samples = 720;
+  for (int k = 0; k < samples; ++k) {
+    const double q = limits.min_rad + (limits.max_rad - limits.min_rad) * (k + 0.5) / samples;
+    const auto w = detail::curve_weights(q, table.size);
+    for (std::size_t i = 0; i < 4; ++i) mean += w.w[i] * c[w.index[i]] / samples;
+  }
+  for (Term<double>& other : set.terms) {
+    if (other.effect != Effect::geometric || other.place != term.place) continue;
+    for (std::size_t k = 0; k < table.size; ++k) c[k] -= mean;
+    other.coefficient += mean;
+    return;
+  }
+}
+
+}  // namespace
+
+Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
+                 const Unknowns& fitted, const Explanation& found) {
+  Refit out;
+  ParametricModel model;
+  model.set = start.set;
+  out.start_terms = start.set.terms.size();
+  out.fitted = fitted;
+  out.fitted.prior.resize(fitted.parameters.size());
+  const auto move_too = [&](const Parameter& p, const PriorKnowledge& prior) {
+    out.fitted.parameters.push_back(p);
+    out.fitted.prior.push_back(prior);
+  };
+
+  std::map<unsigned, CurveParts> curves;
+  for (const Piece& piece : found.pieces) {
+    if (piece.id.effect != Effect::joint_curve) continue;
+    CurveParts& parts = curves[piece.id.joint];
+    if (piece.local) {
+      parts.locals.push_back(&*piece.local);
+      parts.size = std::max({parts.size, std::size_t{72}, piece.local->knots});
+    } else {
+      parts.whole = true;
+      parts.size = std::max(parts.size, piece.id.coefficients);
+    }
+  }
+  std::vector<std::size_t> curve_terms;
+  std::vector<std::pair<std::size_t, std::size_t>> curve_ranges;  // of fitted.parameters
+  for (const auto& [joint, parts] : curves) {
+    const EffectId id{.effect = Effect::joint_curve, .joint = joint, .coefficients = parts.size};
+    const std::size_t first = model.parameters.size();
+    add_effect(model, id, robot.nominal);
+    curve_terms.push_back(model.set.terms.size() - 1);
+    const std::size_t from = out.fitted.parameters.size();
+    for (std::size_t k = 0; k < parts.size; ++k) {
+      PriorKnowledge prior;
+      prior.tolerance = wide_curve_rad;
+      if (is_free(parts, k)) move_too(model.parameters[first + k], prior);
+    }
+    curve_ranges.emplace_back(from, out.fitted.parameters.size());
+  }
+  for (const Piece& piece : found.pieces) {
+    if (piece.id.effect == Effect::joint_curve) continue;
+    if (piece.function) {
+      add_table_of(piece, found, robot, model);
+      continue;
+    }
+    const std::size_t first = model.parameters.size();
+    add_effect(model, piece.id, robot.nominal);
+    std::vector<bool> free(model.parameters.size() - first, false);
+    for (const std::size_t p : piece.parameters) free[p - piece.first_parameter] = true;
+    for (std::size_t k = first; k < model.parameters.size(); ++k) {
+      if (!free[k - first]) continue;
+      PriorKnowledge prior;
+      if (piece.id.effect == Effect::joint_compliance || piece.id.effect == Effect::backlash ||
+          piece.id.effect == Effect::readout_lag)
+        prior.least = 0;
+      move_too(model.parameters[k], prior);
+    }
+  }
+
+  Estimate estimate{model.set, start.f, start.e};
+  out.fit = fit(estimate, out.fitted, rows, robot, {});
+  // Empirical Bayes: the coefficients of a curve are as large as they turn out to be.
+  for (int round = 0; round < 2 && !curve_ranges.empty(); ++round) {
+    for (const auto& [from, to] : curve_ranges) {
+      if (to - from < 4) continue;
+      double square = 0;
+      for (std::size_t p = from; p < to; ++p) {
+        const Eigen::Index i = static_cast<Eigen::Index>(out.fitted.frames.size() + p);
+        const double unit = unit_of(out.fitted.parameters[p], out.fit.estimate.set);
+        square += std::pow(out.fitted.parameters[p].get(out.fit.estimate.set), 2) +
+                  out.fit.covariance(i, i) * unit * unit;
+      }
+      const double size =
+          std::clamp(std::sqrt(square / static_cast<double>(to - from)), 1e-6, wide_curve_rad);
+      for (std::size_t p = from; p < to; ++p) out.fitted.prior[p].tolerance = size;
+    }
+    out.fit = fit(out.fit.estimate, out.fitted, rows, robot, {});
+  }
+  for (const std::size_t t : curve_terms) {
+    const Term<double> term = out.fit.estimate.set.terms[t];
+    centre_curve(out.fit.estimate.set, term, robot);
+  }
+  out.calibration = fitted_calibration(out.fit, out.fitted, robot);
+  return out;
+}
+
+void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
+              const std::vector<Observation>& rows) {
+  const TermSet& set = refit.fit.estimate.set;
+  for (EffectGroup& group : effects_of(set, robot.nominal)) {
+    if (!same_name(group.id, effect.id)) continue;
+    effect.id = group.id;
+    Estimate without = refit.fit.estimate;
+    for (const Parameter& p : group.parameters) {
+      EffectCoefficient c;
+      c.key = p.name.substr(p.name.rfind('.') + 1);
+      c.unit = p.unit;
+      c.value = p.get(set);
+      c.sigma = std::nan("");
+      for (std::size_t k = 0; k < refit.fitted.parameters.size(); ++k) {
+        if (refit.fitted.parameters[k].name != p.name) continue;
+        const Eigen::Index i = static_cast<Eigen::Index>(refit.fitted.frames.size() + k);
+        c.sigma = std::sqrt(std::max(0.0, refit.fit.covariance(i, i))) * unit_of(p, set);
+      }
+      effect.coefficients.push_back(c);
+      p.set(without.set, 0);
+    }
+    const auto with_model = prepare(set, robot, "diagnosis");
+    const auto without_model = prepare(without.set, robot, "diagnosis");
+    const std::vector<RowResidual> a = residuals(refit.fit.estimate, *with_model, rows);
+    const std::vector<RowResidual> b = residuals(without, *without_model, rows);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double moved = (a[k].position_m - b[k].position_m).norm();
+      effect.largest_m = std::max(effect.largest_m, moved);
+      effect.rms_m += moved * moved / static_cast<double>(rows.size());
+    }
+    effect.rms_m = std::sqrt(effect.rms_m);
+    return;
+  }
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,30 @@
+/// \file
+/// The whole model with what was found, fitted anew: nothing is frozen.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
+
+#include <vector>
+
+#include "diagnosis/explanation.hpp"
+#include "files/calibration_file.hpp"
+#include "identification/estimator.hpp"
+
+namespace flexcomp::host {
+
+struct Refit {
+  Fit fit;  ///< of the start's parameters and the effects'
+  Unknowns fitted;
+  Calibration calibration;
+  std::size_t start_terms = 0;  ///< the first so many terms of the set are the start's
+};
+
+Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
+                 const Unknowns& fitted, const Explanation& found);
+
+/// Coefficients, and how far the effect moves the measured point.
+void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
+              const std::vector<Observation>& rows);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,346 @@
+#include "diagnosis/remainder.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <numeric>
+
+namespace flexcomp::host {
+
+namespace {
+
+/// One place seen by a remainder, a scalar per row: what a motion of the place there would explain.
+struct Scalar {
+  Eigen::VectorXd square;   ///< |u|^2
+  Eigen::VectorXd product;  ///< u . r
+  Eigen::MatrixXd basis;    ///< one column per row: basis^T u
+};
+
+Scalar scalar(const GapSystem& system, const Remainder& left, const Eigen::VectorXd& column) {
+  const Eigen::Index n = static_cast<Eigen::Index>(system.rows);
+  Scalar s{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd(left.basis.cols(), n)};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto u = column.segment<6>(6 * k);
+    s.square[k] = u.squaredNorm();
+    s.product[k] = u.dot(left.residual.segment<6>(6 * k));
+    s.basis.col(k).noalias() = left.basis.middleRows<6>(6 * k).transpose() * u;
+  }
+  return s;
+}
+
+double spline(double x) {
+  x = std::abs(x);
+  if (x < 1) return 2.0 / 3 - x * x + x * x * x / 2;
+  return x < 2 ? std::pow(2 - x, 3) / 6 : 0;
+}
+
+double turn_apart(double a, double b) { return std::remainder(a - b, 2 * pi); }
+
+}  // namespace
+
+Remainder remainder(const SubsetSearch& search, const Scored& solution) {
+  const GapSystem& system = search.system();
+  Remainder out;
+  out.noise_scale2 = search.noise_scale2();
+  out.residual = system.residual;
+  Eigen::Index count = 0;
+  for (const std::size_t b : solution.blocks)
+    count += static_cast<Eigen::Index>(system.blocks[b].columns.size());
+  Eigen::MatrixXd added(system.columns.rows(), count);
+  Eigen::Index at = 0;
+  bool prior = false;
+  for (const std::size_t b : solution.blocks) {
+    prior = prior || system.blocks[b].precision > 0;
+    for (const Eigen::Index c : system.blocks[b].columns) {
+      out.residual -= system.columns.col(c) * solution.solution[at];
+      added.col(at++) = system.columns.col(c);
+    }
+  }
+  if (count > 0) {
+    // Columns that the others span would give the basis directions of rounding.
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(added);
+    const Eigen::Index rank = qr.rank();
+    const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(added.rows(), rank);
+    out.basis.resize(added.rows(), system.nuisance.cols() + rank);
+    out.basis << system.nuisance, q;
+    out.residual -= q * (q.transpose() * out.residual);
+  } else {
+    out.basis = system.nuisance;
+  }
+  return out;
+}
+
+std::vector<PlaceShare> place_shares(const GapSystem& system, const Remainder& left) {
+  std::vector<PlaceShare> shares;
+  const double dof = system.numbers - static_cast<double>(left.basis.cols());
+  const double beyond = left.chi2() - dof;
+  for (const PlaceColumn& place : system.places) {
+    const Scalar s = scalar(system, left, place.column);
+    double found = 0;
+    double expected = 0;
+    double square = 0;
+    for (Eigen::Index k = 0; k < s.square.size(); ++k) {
+      if (!(s.square[k] > 0)) continue;
+      const double freedom = std::max(0.0, 1 - s.basis.col(k).squaredNorm() / s.square[k]);
+      if (freedom < 1e-6) continue;
+      found += s.product[k] * s.product[k] / s.square[k] / left.noise_scale2;
+      expected += freedom;
+      square += freedom * freedom;
+    }
+    if (!(expected > 0.5)) continue;
+    // Satterthwaite: a multiple of a chi-square with the same mean and variance.
+    const double factor = square / expected;
+    const boost::math::chi_squared noise(expected / factor);
+    PlaceShare share;
+    share.place = place.place;
+    share.p_value = boost::math::cdf(boost::math::complement(noise, found / factor));
+    share.explains = beyond > 0 ? std::clamp((found - expected) / beyond, 0.0, 1.0) : 0;
+    shares.push_back(share);
+  }
+  std::stable_sort(shares.begin(), shares.end(),
+                   [](const PlaceShare& a, const PlaceShare& b) { return a.explains > b.explains; });
+  return shares;
+}
+
+Eigen::VectorXd local_values(const LocalCurve& curve, const std::vector<Observation>& rows) {
+  Eigen::VectorXd v(static_cast<Eigen::Index>(rows.size()));
+  const double per_rad = static_cast<double>(curve.knots) / (2 * pi);
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    v[static_cast<Eigen::Index>(k)] =
+        spline(turn_apart(rows[k].q_rad[curve.joint - 1], curve.centre_rad) * per_rad);
+  return v;
+}
+
+std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& left,
+                                     const std::vector<Observation>& rows, std::size_t per_joint) {
+  std::vector<LocalCurve> chosen;
+  const double log_n = std::log(std::max(2.0, system.numbers));
+  for (unsigned joint = 1; joint <= joint_count; ++joint) {
+    const Place place{static_cast<std::uint8_t>(joint), slot::theta};
+    const Scalar s = scalar(system, left, place_column(system, place).column);
+    std::vector<std::pair<double, Eigen::Index>> order;
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      order.emplace_back(turn_apart(rows[k].q_rad[joint - 1], 0), static_cast<Eigen::Index>(k));
+    std::sort(order.begin(), order.end());
+    std::vector<LocalCurve> all;
+    for (const std::size_t knots : {24U, 36U, 48U, 72U, 96U}) {
+      const double spacing = 2 * pi / static_cast<double>(knots);
+      for (std::size_t c = 0; c < 2 * knots; ++c) {
+        const double centre = -pi + 0.5 * spacing * static_cast<double>(c);
+        double b = 0;
+        double square = 0;
+        std::size_t touched = 0;
+        Eigen::VectorXd w = Eigen::VectorXd::Zero(left.basis.cols());
+        // Rows inside the support, over the end of the turn as well.
+        const auto visit = [&](double from, double to) {
+          for (auto at = std::lower_bound(order.begin(), order.end(), std::pair{from, Eigen::Index{-1}});
+               at != order.end() && at->first < to; ++at) {
+            const double phi = spline(turn_apart(at->first, centre) / spacing);
+            if (phi <= 0 || !(s.square[at->second] > 0)) continue;
+            b += phi * s.product[at->second];
+            square += phi * phi * s.square[at->second];
+            w += phi * s.basis.col(at->second);
+            if (phi > 0.1) ++touched;
+          }
+        };
+        visit(centre - 2 * spacing, centre + 2 * spacing);
+        if (centre - 2 * spacing < -pi) visit(centre - 2 * spacing + 2 * pi, pi + 1e-9);
+        if (centre + 2 * spacing > pi) visit(-pi - 1e-9, centre + 2 * spacing - 2 * pi);
+        const double norm = square - w.squaredNorm();
+        // One pose is no curve: nothing says that it is this joint's reading that it follows.
+        if (touched < 2 || !(norm > 0.05 * square)) continue;
+        all.push_back({joint, knots, centre, b * b / norm / left.noise_scale2 - 3 * log_n});
+      }
+    }
+    std::sort(all.begin(), all.end(),
+              [](const LocalCurve& a, const LocalCurve& b) { return a.gain > b.gain; });
+    std::size_t taken = 0;
+    for (const LocalCurve& c : all) {
+      if (taken >= per_joint || !(c.gain > 0)) break;
+      const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const LocalCurve& other) {
+        return other.joint == joint &&
+               std::abs(turn_apart(other.centre_rad, c.centre_rad)) <
+                   2 * pi / static_cast<double>(other.knots) + 2 * pi / static_cast<double>(c.knots);
+      });
+      if (near) continue;
+      chosen.push_back(c);
+      ++taken;
+    }
+  }
+  return chosen;
+}
+
+std::vector<Slip> slips(const GapSystem& system, const Remainder& left, const std::vector<Observation>& rows,
+                        const std::array<Eigen::VectorXd, 3>& point_columns, std::size_t most) {
+  const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
+  std::vector<Eigen::Index> order(rows.size());
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  const auto time = [&](Eigen::Index k) { return rows[static_cast<std::size_t>(k)].context.time_s; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return time(a) > time(b); });
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(left.basis.cols(), 3);
+  std::vector<Slip> all;
+  const double log_n = std::log(std::max(2.0, system.numbers));
+  for (Eigen::Index i = 0; i + 1 < n; ++i) {
+    const Eigen::Index k = order[static_cast<std::size_t>(i)];
+    Eigen::Matrix<double, 6, 3> u;
+    for (int c = 0; c < 3; ++c) u.col(c) = point_columns[static_cast<std::size_t>(c)].segment<6>(6 * k);
+    normal += u.transpose() * u;
+    right += u.transpose() * left.residual.segment<6>(6 * k);
+    basis += left.basis.middleRows<6>(6 * k).transpose() * u;
+    const Eigen::Index before = order[static_cast<std::size_t>(i + 1)];
+    if (!(time(before) < time(k)) || i < 1 || i + 2 >= n) continue;
+    const Eigen::Matrix3d a = normal - basis.transpose() * basis;
+    const Eigen::LLT<Eigen::Matrix3d> factor(a);
+    if (factor.info() != Eigen::Success) continue;
+    all.push_back(
+        {0.5 * (time(before) + time(k)), right.dot(factor.solve(right)) / left.noise_scale2 - 4 * log_n});
+  }
+  std::sort(all.begin(), all.end(), [](const Slip& a, const Slip& b) { return a.gain > b.gain; });
+  if (all.size() > most) all.resize(most);
+  return all;
+}
+
+// --- smooth functions -------------------------------------------------------------------------------------------------
+
+std::string Variable::name() const { return is_order ? "order" : covariate_name(kind, joint); }
+
+std::vector<Variable> variables(const std::vector<Observation>& rows, const Testable& can) {
+  std::vector<Variable> list;
+  const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
+  const auto add = [&](Covariate kind, unsigned joint, auto value) {
+    Variable v;
+    v.kind = kind;
+    v.joint = joint;
+    v.value.resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) v.value[k] = value(rows[static_cast<std::size_t>(k)]);
+    if (v.value.maxCoeff() - v.value.minCoeff() > 1e-9) list.push_back(std::move(v));
+  };
+  for (unsigned j = 1; j <= joint_count; ++j)
+    add(Covariate::reading, j, [j](const Observation& r) { return r.q_rad[j - 1]; });
+  add(Covariate::payload, 0, [](const Observation& r) { return r.context.payload_kg; });
+  if (can.temperature)
+    add(Covariate::temperature, 0, [](const Observation& r) { return r.context.temperature_c; });
+  if (can.time) add(Covariate::time, 0, [](const Observation& r) { return r.context.time_s; });
+  for (unsigned j = 1; j <= joint_count; ++j) {
+    if (can.direction[j - 1])
+      add(Covariate::direction, j, [j](const Observation& r) { return r.context.direction[j - 1]; });
+  }
+  Variable order;
+  order.is_order = true;
+  order.value = Eigen::VectorXd::LinSpaced(n, 0, 1);
+  list.push_back(std::move(order));
+  return list;
+}
+
+namespace {
+
+/// Members of a function of one variable, without the constant, and the prior standard deviation of each.
+Eigen::MatrixXd members_of_one(const Variable& range, const Eigen::VectorXd& at, int harmonics) {
+  const double low = range.value.minCoeff();
+  const double high = range.value.maxCoeff();
+  const Eigen::ArrayXd x = (2 * at.array() - low - high) / std::max(high - low, 1e-12);  // -1 … 1
+  if (range.kind == Covariate::reading && !range.is_order) {
+    Eigen::MatrixXd m(at.size(), 1 + 2 * harmonics);
+    m.col(0) = x;
+    for (int h = 1; h <= harmonics; ++h) {
+      m.col(2 * h - 1) = (h * at.array()).sin() / std::sqrt(h);
+      m.col(2 * h) = (h * at.array()).cos() / std::sqrt(h);
+    }
+    return m;
+  }
+  if (range.kind == Covariate::direction) return x.matrix();
+  // Few values of a payload carry few powers.
+  std::vector<double> distinct(range.value.data(), range.value.data() + range.value.size());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end(),
+                             [&](double a, double b) { return b - a < 1e-6 * (high - low); }),
+                 distinct.end());
+  Eigen::MatrixXd m(at.size(), distinct.size() > 2 ? 2 : 1);
+  m.col(0) = x;
+  if (m.cols() > 1) m.col(1) = 0.5 * x.square();
+  return m;
+}
+
+}  // namespace
+
+Eigen::MatrixXd members(const std::vector<const Variable*>& of, const std::vector<Eigen::VectorXd>& at) {
+  if (of.size() == 1) return members_of_one(*of[0], at[0], 4);
+  const Eigen::MatrixXd a = members_of_one(*of[0], at[0], 2);
+  const Eigen::MatrixXd b = members_of_one(*of[1], at[1], 2);
+  Eigen::MatrixXd all(a.rows(), a.cols() + b.cols() + a.cols() * b.cols());
+  all << a, b, Eigen::MatrixXd(a.rows(), a.cols() * b.cols());
+  for (Eigen::Index i = 0; i < a.cols(); ++i) {
+    for (Eigen::Index k = 0; k < b.cols(); ++k)
+      all.col(a.cols() + b.cols() + i * b.cols() + k) = a.col(i).cwiseProduct(b.col(k));
+  }
+  return all;
+}
+
+std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Remainder& left,
+                                             const std::vector<Variable>& of, std::size_t most) {
+  constexpr std::array<double, 4> sizes{30e-6, 100e-6, 300e-6, 1000e-6};  // rad
+  std::vector<std::vector<std::size_t>> sets;
+  for (std::size_t a = 0; a < of.size(); ++a) {
+    sets.push_back({a});
+    if (of[a].is_order) continue;
+    for (std::size_t b = a + 1; b < of.size(); ++b) {
+      if (of[b].is_order || of[a].kind == Covariate::direction) continue;
+      sets.push_back({a, b});
+    }
+  }
+  const double tried = 2 * std::log(static_cast<double>(sets.size() * joint_count * sizes.size()));
+  std::vector<Scalar> joints;
+  for (unsigned j = 1; j <= joint_count; ++j) {
+    joints.push_back(
+        scalar(system, left, place_column(system, {static_cast<std::uint8_t>(j), slot::theta}).column));
+  }
+  std::vector<SmoothFunction> all;
+  for (const std::vector<std::size_t>& set : sets) {
+    std::vector<const Variable*> which;
+    std::vector<Eigen::VectorXd> at;
+    for (const std::size_t v : set) {
+      which.push_back(&of[v]);
+      at.push_back(of[v].value);
+    }
+    const Eigen::MatrixXd phi = members(which, at);
+    for (unsigned j = 1; j <= joint_count; ++j) {
+      // A coupling of the direction of one joint to another is nobody's.
+      if (set.size() == 1 && of[set[0]].kind == Covariate::direction && of[set[0]].joint == j) continue;
+      const Scalar& s = joints[j - 1];
+      const Eigen::MatrixXd w = s.basis * phi;
+      const Eigen::MatrixXd a =
+          (phi.transpose() * s.square.asDiagonal() * phi - w.transpose() * w) / left.noise_scale2;
+      const Eigen::VectorXd b = phi.transpose() * s.product / left.noise_scale2;
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
+      const Eigen::VectorXd along = eigen.eigenvectors().transpose() * b;
+      SmoothFunction f;
+      f.place = {static_cast<std::uint8_t>(j), slot::theta};
+      f.of = set;
+      f.gain = -1e300;
+      for (const double size : sizes) {
+        double gain = -tried;
+        for (Eigen::Index k = 0; k < along.size(); ++k) {
+          const double l = std::max(0.0, eigen.eigenvalues()[k]);
+          gain += along[k] * along[k] / (l + 1 / (size * size)) - std::log1p(size * size * l);
+        }
+        if (gain > f.gain) {
+          f.gain = gain;
+          f.size_rad = size;
+        }
+      }
+      all.push_back(f);
+    }
+  }
+  std::sort(all.begin(), all.end(),
+            [](const SmoothFunction& a, const SmoothFunction& b) { return a.gain > b.gain; });
+  if (all.size() > most) all.resize(most);
+  return all;
+}
+
+}  // namespace flexcomp::host

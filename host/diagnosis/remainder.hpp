@@ -1,0 +1,81 @@
+/// \file
+/// A misfit with some blocks taken out, and what it looks like from the places of the chain: where it sits, which
+/// covariates it follows, and where along a joint or in time it begins.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_REMAINDER_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_REMAINDER_HPP
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/gap_system.hpp"
+#include "diagnosis/subset_search.hpp"
+#include "measurement/observation.hpp"
+
+namespace flexcomp::host {
+
+/// What a solution leaves.
+struct Remainder {
+  Eigen::VectorXd residual;  ///< whitened
+  Eigen::MatrixXd basis;     ///< orthonormal: nuisance and blocks
+  double noise_scale2 = 1;
+  double chi2() const { return residual.squaredNorm() / noise_scale2; }
+};
+
+Remainder remainder(const SubsetSearch& search, const Scored& solution);
+
+/// Shares of all places, largest first: a motion of the place alone, free from pose to pose. p from the chi-square
+/// distribution with the moments that the noise gives.
+std::vector<PlaceShare> place_shares(const GapSystem& system, const Remainder& left);
+
+/// Best local faults of each joint: one cubic B-spline of the reading on a knot spacing of 2 pi / M, wherever it fits;
+/// `per_joint` of them, apart from each other.
+struct LocalCurve {
+  unsigned joint = 0;  ///< from 1
+  std::size_t knots = 0;
+  double centre_rad = 0;
+  double gain = 0;  ///< over three parameters: size, centre, width
+};
+std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& left,
+                                     const std::vector<Observation>& rows, std::size_t per_joint);
+/// The spline of a local curve at every row.
+Eigen::VectorXd local_values(const LocalCurve& curve, const std::vector<Observation>& rows);
+
+/// Times from which on the measured point best lies elsewhere, by gain.
+struct Slip {
+  double after_s = 0;
+  double gain = 0;
+};
+std::vector<Slip> slips(const GapSystem& system, const Remainder& left, const std::vector<Observation>& rows,
+                        const std::array<Eigen::VectorXd, 3>& point_columns, std::size_t most);
+
+/// What a function may be a function of.
+struct Variable {
+  Covariate kind = Covariate::reading;
+  unsigned joint = 0;     ///< from 1, where the kind needs one
+  bool is_order = false;  ///< of measurement, not a covariate of the core
+  Eigen::VectorXd value;  ///< per row
+  std::string name() const;
+};
+std::vector<Variable> variables(const std::vector<Observation>& rows, const Testable& can);
+
+/// A smooth function of one or two variables that turns a joint.
+struct SmoothFunction {
+  Place place;
+  std::vector<std::size_t> of;  ///< indices of variables, one or two
+  double size_rad = 0;          ///< prior standard deviation of a coefficient
+  double gain = 0;  ///< evidence: 2 ln of the Bayes factor, less 2 ln of the number of functions tried
+};
+std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Remainder& left,
+                                             const std::vector<Variable>& of, std::size_t most);
+/// Values of the function's members (columns, scaled to a prior standard deviation of 1) at given values of its
+/// variables; `of[k]` belongs to the range of `variables[k]`.
+Eigen::MatrixXd members(const std::vector<const Variable*>& variables,
+                        const std::vector<Eigen::VectorXd>& at);
+
+}  // namespace flexcomp::host
+
+#endif

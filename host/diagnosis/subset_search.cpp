@@ -1,0 +1,303 @@
+#include "diagnosis/subset_search.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr double minus_infinity = -std::numeric_limits<double>::infinity();
+
+/// Share of a column's own information that is added to it where it has no prior, so that directions which the columns
+/// of a set leave wholly open (the sum of a curve's splines) stay at zero.
+constexpr double nearly_free = 1e-8;
+
+/// What is left of a column after the others, by which it counts as theirs (squared share).
+constexpr double spanned = 1e-6;
+
+bool follows_own_reading(Effect e) {
+  return e == Effect::gear_harmonic || e == Effect::encoder_scale || e == Effect::joint_curve;
+}
+
+}  // namespace
+
+SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2, double margin)
+    : system_(system),
+      scale2_(noise_scale2),
+      margin_(margin),
+      log_n_(std::log(std::max(2.0, system.numbers))) {
+  gram_ = Eigen::MatrixXd::Zero(system.columns.cols(), system.columns.cols());
+  gram_.selfadjointView<Eigen::Lower>().rankUpdate(system.columns.transpose(), 1 / scale2_);
+  gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
+  product_ = system.columns.transpose() * system.residual / scale2_;
+  total_ = system.residual.squaredNorm() / scale2_ * (1 + 1e-9);
+}
+
+double SubsetSearch::precision_of(const Block& block, Eigen::Index column) const {
+  return block.precision > 0 ? block.precision : nearly_free * gram_(column, column);
+}
+
+void SubsetSearch::extend() {
+  const Eigen::Index had = gram_.cols();
+  const Eigen::Index has = system_.columns.cols();
+  gram_.conservativeResize(has, has);
+  const auto fresh = system_.columns.rightCols(has - had);
+  gram_.bottomRows(has - had) = fresh.transpose() * system_.columns / scale2_;
+  gram_.topRightCorner(had, has - had) = gram_.bottomLeftCorner(has - had, had).transpose();
+  product_.conservativeResize(has);
+  product_.tail(has - had) = fresh.transpose() * system_.residual / scale2_;
+}
+
+bool SubsetSearch::compatible(std::size_t a, std::size_t b) const {
+  const EffectId& x = system_.blocks[a].id;
+  const EffectId& y = system_.blocks[b].id;
+  if (same_name(x, y)) {
+    // Several local faults of one joint make one curve.
+    return x.effect == Effect::joint_curve && system_.blocks[a].width_rad > 0 &&
+           system_.blocks[b].width_rad > 0 &&
+           std::abs(std::remainder(system_.blocks[a].centre_rad - system_.blocks[b].centre_rad, 2 * pi)) >
+               system_.blocks[a].width_rad + system_.blocks[b].width_rad;
+  }
+  if (x.effect == Effect::thermal_growth && y.effect == Effect::thermal_growth &&
+      (x.link == 0 || y.link == 0))
+    return false;
+  if (x.joint == y.joint && follows_own_reading(x.effect) && follows_own_reading(y.effect)) {
+    const bool curve_x = x.effect == Effect::joint_curve && system_.blocks[a].width_rad == 0;
+    const bool curve_y = y.effect == Effect::joint_curve && system_.blocks[b].width_rad == 0;
+    return !curve_x && !curve_y;  // the smooth curve contains the other
+  }
+  return true;
+}
+
+Scored SubsetSearch::score(const Subset& subset) const {
+  Scored out;
+  out.blocks = subset;
+  std::vector<Eigen::Index> index;
+  Eigen::VectorXd prior;
+  // Blocks with a prior come last: the factor's diagonal is then that of their Schur complement.
+  Subset ordered = subset;
+  std::stable_sort(ordered.begin(), ordered.end(), [&](std::size_t a, std::size_t b) {
+    return (system_.blocks[a].precision > 0) < (system_.blocks[b].precision > 0);
+  });
+  out.blocks = ordered;
+  for (const std::size_t b : ordered)
+    index.insert(index.end(), system_.blocks[b].columns.begin(), system_.blocks[b].columns.end());
+  const Eigen::Index n = static_cast<Eigen::Index>(index.size());
+  Eigen::MatrixXd normal(n, n);
+  Eigen::VectorXd right(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    right[i] = product_[index[static_cast<std::size_t>(i)]];
+    for (Eigen::Index k = 0; k <= i; ++k)
+      normal(i, k) = normal(k, i) =
+          gram_(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(k)]);
+  }
+  prior.resize(n);
+  Eigen::Index at = 0;
+  for (const std::size_t b : ordered) {
+    for (const Eigen::Index c : system_.blocks[b].columns) prior[at++] = precision_of(system_.blocks[b], c);
+  }
+  normal.diagonal() += prior;
+  const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+  if (factor.info() != Eigen::Success) {
+    out.gain = minus_infinity;
+    return out;
+  }
+  out.solution = factor.solve(right);
+  out.chi2_gain = out.solution.dot(right);
+  // More than there is: the columns are one another's to rounding.
+  if (!(out.chi2_gain <= total_)) {
+    out.gain = minus_infinity;
+    return out;
+  }
+  out.gain = out.chi2_gain;
+  at = 0;
+  for (const std::size_t b : ordered) {
+    const Block& block = system_.blocks[b];
+    const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
+    if (block.precision > 0) {
+      for (Eigen::Index k = at; k < at + size; ++k)
+        out.gain -= std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+    }
+    // A scan has looked at many positions of a function with few numbers: they count besides the evidence.
+    out.gain -= block.parameters * log_n_;
+    out.parameters += block.parameters;
+    if (block.positive) {
+      for (Eigen::Index k = at; k < at + size; ++k) {
+        if (out.solution[k] < 0) out.gain = minus_infinity;
+      }
+    }
+    at += size;
+  }
+  return out;
+}
+
+std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
+  std::vector<Eigen::Index> index;
+  std::vector<double> prior;
+  for (const std::size_t b : subset) {
+    for (const Eigen::Index c : system_.blocks[b].columns) {
+      index.push_back(c);
+      prior.push_back(precision_of(system_.blocks[b], c));
+    }
+  }
+  const Eigen::Index n = static_cast<Eigen::Index>(index.size());
+  Eigen::MatrixXd reduced(n, gram_.cols());  // L^-1 G[S, :]
+  Eigen::VectorXd done = Eigen::VectorXd::Zero(n);
+  if (n > 0) {
+    Eigen::MatrixXd normal(n, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      reduced.row(i) = gram_.row(index[static_cast<std::size_t>(i)]);
+      done[i] = product_[index[static_cast<std::size_t>(i)]];
+      for (Eigen::Index k = 0; k < n; ++k)
+        normal(i, k) = gram_(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(k)]);
+      normal(i, i) += prior[static_cast<std::size_t>(i)];
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+    factor.matrixL().solveInPlace(reduced);
+    factor.matrixL().solveInPlace(done);
+  }
+  std::vector<double> gains(system_.blocks.size(), minus_infinity);
+  for (std::size_t b = 0; b < system_.blocks.size(); ++b) {
+    const Block& block = system_.blocks[b];
+    if (std::any_of(subset.begin(), subset.end(), [&](std::size_t s) { return s == b || !compatible(s, b); }))
+      continue;
+    const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
+    Eigen::MatrixXd normal(size, size);
+    Eigen::VectorXd right(size);
+    bool is_spanned = false;
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const Eigen::Index ci = block.columns[static_cast<std::size_t>(i)];
+      right[i] = product_[ci] - (n > 0 ? reduced.col(ci).dot(done) : 0);
+      for (Eigen::Index k = 0; k <= i; ++k) {
+        const Eigen::Index ck = block.columns[static_cast<std::size_t>(k)];
+        normal(i, k) = normal(k, i) = gram_(ci, ck) - (n > 0 ? reduced.col(ci).dot(reduced.col(ck)) : 0);
+      }
+      if (normal(i, i) < spanned * gram_(ci, ci) && size == 1) is_spanned = true;
+      normal(i, i) += precision_of(block, ci);
+    }
+    if (is_spanned) continue;
+    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+    if (factor.info() != Eigen::Success) continue;
+    const Eigen::VectorXd solution = factor.solve(right);
+    if (block.positive && (solution.array() < 0).any()) continue;
+    double gain = solution.dot(right);
+    if (block.precision > 0) {
+      for (Eigen::Index k = 0; k < size; ++k)
+        gain -= std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+    }
+    gains[b] = gain - block.parameters * log_n_;
+  }
+  return gains;
+}
+
+Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts,
+                          const std::vector<bool>& allowed) const {
+  constexpr std::size_t beam = 4;
+  const auto may = [&](std::size_t b) { return allowed.empty() || allowed[b]; };
+  std::vector<Subset> front{Subset()};
+  front.insert(front.end(), starts.begin(), starts.end());
+  Scored best = score(Subset());
+  for (const Subset& s : front) {
+    const Scored scored = score(s);
+    if (value(scored) > value(best)) best = scored;
+  }
+  std::set<Subset> seen;
+  int idle = 0;
+  for (std::size_t depth = 0; depth < largest && idle < 2; ++depth) {
+    front.erase(
+        std::remove_if(front.begin(), front.end(), [&](const Subset& s) { return s.size() >= largest; }),
+        front.end());
+    std::vector<std::pair<double, Subset>> next;
+    for (const Subset& s : front) {
+      const double here = score(s).gain;
+      const std::vector<double> gains = extensions(s);
+      std::vector<std::size_t> order;
+      for (std::size_t b = 0; b < gains.size(); ++b) {
+        if (gains[b] > minus_infinity && may(b)) order.push_back(b);
+      }
+      const std::size_t few = std::min<std::size_t>(order.size(), 2 * beam);
+      std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(few), order.end(),
+                        [&](std::size_t a, std::size_t b) { return gains[a] > gains[b]; });
+      for (std::size_t k = 0; k < few; ++k) {
+        Subset t = s;
+        t.push_back(order[k]);
+        std::sort(t.begin(), t.end());
+        if (!seen.insert(t).second) continue;
+        next.emplace_back(here + gains[order[k]] - margin_ * static_cast<double>(t.size()), t);
+      }
+    }
+    std::sort(next.begin(), next.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    front.clear();
+    bool better = false;
+    for (const auto& [guess, s] : next) {
+      const Scored scored = score(s);
+      if (scored.gain == minus_infinity) continue;
+      if (value(scored) > value(best)) {
+        best = scored;
+        better = true;
+      }
+      front.push_back(s);
+      if (front.size() >= beam) break;
+    }
+    idle = better ? 0 : idle + 1;
+    if (front.empty()) break;
+  }
+  // Exchanges and removals.
+  for (int round = 0; round < 20; ++round) {
+    Scored better = best;
+    for (std::size_t k = 0; k < best.blocks.size(); ++k) {
+      Subset without = best.blocks;
+      without.erase(without.begin() + static_cast<std::ptrdiff_t>(k));
+      const Scored removed = score(without);
+      if (value(removed) > value(better)) better = removed;
+      const std::vector<double> gains = extensions(without);
+      for (std::size_t b = 0; b < gains.size(); ++b) {
+        if (!may(b) ||
+            !(removed.gain + gains[b] - margin_ * static_cast<double>(best.blocks.size()) > value(better)))
+          continue;
+        Subset exchanged = without;
+        exchanged.push_back(b);
+        const Scored scored = score(exchanged);
+        if (value(scored) > value(better) + 1e-9) better = scored;
+      }
+    }
+    if (!(value(better) > value(best) + 1e-9)) break;
+    best = better;
+  }
+  return best;
+}
+
+Eigen::VectorXd SubsetSearch::largest_single_gains(const Eigen::MatrixXd& residuals) const {
+  const Eigen::MatrixXd products = system_.columns.transpose() * residuals / scale2_;
+  Eigen::VectorXd largest = Eigen::VectorXd::Constant(residuals.cols(), minus_infinity);
+  for (const Block& block : system_.blocks) {
+    const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
+    Eigen::MatrixXd normal(size, size);
+    Eigen::MatrixXd right(size, residuals.cols());
+    for (Eigen::Index i = 0; i < size; ++i) {
+      right.row(i) = products.row(block.columns[static_cast<std::size_t>(i)]);
+      for (Eigen::Index k = 0; k < size; ++k)
+        normal(i, k) =
+            gram_(block.columns[static_cast<std::size_t>(i)], block.columns[static_cast<std::size_t>(k)]);
+      normal(i, i) += precision_of(block, block.columns[static_cast<std::size_t>(i)]);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+    if (factor.info() != Eigen::Success) continue;
+    double cost = block.parameters * log_n_;
+    if (block.precision > 0) {
+      for (Eigen::Index k = 0; k < size; ++k)
+        cost += std::log(std::pow(factor.matrixLLT()(k, k), 2) / block.precision);
+    }
+    factor.matrixL().solveInPlace(right);
+    for (Eigen::Index c = 0; c < right.cols(); ++c) {
+      if (block.positive && size == 1 && right(0, c) < 0) continue;
+      largest[c] = std::max(largest[c], right.col(c).squaredNorm() - cost);
+    }
+  }
+  return largest;
+}
+
+}  // namespace flexcomp::host
