@@ -142,6 +142,7 @@ Outcome judge(const hidden::Case& c, const Oracle& oracle, const Diagnosis& d) {
     if (!h.detectable()) out.detectable = false;
     if (!out.rival.empty() && h.margin >= out.margin) continue;
     out.margin = h.margin;
+    out.untold_margin = h.untold_margin;
     out.rival = h.rival;
   }
   out.said = words_of(d);

@@ -19,6 +19,7 @@ struct Outcome {
   bool decidable = true;         ///< all of what is hidden
   bool detectable = true;        ///< the oracle's BIC beats leaving any of it out
   double margin = 0;             ///< least over what is hidden
+  double untold_margin = 0;      ///< the same where the shape of a bump is not told
   std::string rival;             ///< of that
   bool oracle_converged = true;
 

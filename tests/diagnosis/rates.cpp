@@ -64,15 +64,16 @@ std::string quoted(const std::string& text) {
 }
 
 constexpr const char* csv_header =
-    "row,seed,arm,hidden,group,decidable,detectable,margin,rival,said,right,listed,wrong,rms_before_um,"
+    "row,seed,arm,hidden,group,decidable,detectable,margin,untold_margin,rival,said,right,listed,wrong,rms_"
+    "before_um,"
     "rms_oracle_um,rms_um,seconds,processor_seconds\n";
 
 std::string csv_line(const Outcome& o) {
   return fmt::format(
-      "{},{},{},{},{},{:d},{:d},{:.2f},{},{},{:d},{:d},{:d},{:.2f},{:.2f},{:.2f},{:.3f},{:.3f}\n",
+      "{},{},{},{},{},{:d},{:d},{:.2f},{:.2f},{},{},{:d},{:d},{:d},{:.2f},{:.2f},{:.2f},{:.3f},{:.3f}\n",
       hidden::name(o.row), o.seed, o.arm, quoted(o.what), quoted(o.group), o.decidable, o.detectable,
-      o.margin, quoted(o.rival), quoted(o.said), o.right, o.listed, o.wrong, o.rms_before_m * 1e6,
-      o.rms_oracle_m * 1e6, o.rms_m * 1e6, o.seconds, o.processor_seconds);
+      o.margin, o.untold_margin, quoted(o.rival), quoted(o.said), o.right, o.listed, o.wrong,
+      o.rms_before_m * 1e6, o.rms_oracle_m * 1e6, o.rms_m * 1e6, o.seconds, o.processor_seconds);
 }
 
 /// A case whose answer a reader wants to look into.
@@ -165,6 +166,10 @@ void print_rates(hidden::Row row, const std::vector<Outcome>& outcomes) {
       break;
     case Row::local:
       print_rate("decidable: a curve of that joint alone", rate_of(outcomes, decidable, right), 0.95);
+      print_rate("decidable without being told its place",
+                 rate_of(
+                     outcomes, [](const Outcome& o) { return o.untold_margin >= 10; }, right),
+                 0);
       print_rate("all: a curve of that joint alone", rate_of(outcomes, all, right), 0);
       break;
     case Row::outside:

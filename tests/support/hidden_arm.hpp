@@ -33,7 +33,7 @@ enum class Row {
 };
 const std::vector<Row>& all_rows();
 std::string name(Row row);
-std::optional<Row> row_of(const std::string& name);
+std::optional<Row> row_of(const std::string& wanted);
 
 /// An effect by its name, with its true coefficients in the order of the catalogue's keys.
 struct Effect {
