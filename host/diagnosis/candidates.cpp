@@ -50,6 +50,16 @@ class Builder {
     }
   }
 
+  /// The effect that was added last once more, its coefficients being of these sizes.
+  void smooth_forms(const std::vector<double>& sizes_rad) {
+    if (out_.list.empty() || out_.list.back().id.effect != Effect::joint_curve) return;
+    const Candidate free = out_.list.back();
+    for (const double size : sizes_rad) {
+      out_.list.push_back(free);
+      out_.list.back().prior_rad = size;
+    }
+  }
+
   void lacks(Effect effect, std::vector<std::string> needs) {
     out_.not_testable.push_back({effect, std::move(needs)});
   }
@@ -160,6 +170,7 @@ CandidateSet candidates(const RobotFile& robot, const std::vector<Observation>& 
       if (2 * size > rows.size()) continue;
       id.coefficients = size;
       b.add(id);
+      if (size == 24 || size == 36) b.smooth_forms({5e-5, 1.5e-4, 5e-4});
     }
   }
   std::vector<std::string> no_direction;

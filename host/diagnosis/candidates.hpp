@@ -20,6 +20,7 @@ struct Candidate {
   EffectId id;
   std::vector<std::size_t> parameters;  ///< indices into CandidateSet::parameters
   std::size_t first = 0;                ///< of these, the first one of the whole effect
+  double prior_rad = 0;                 ///< of a smooth curve: standard deviation of a coefficient; 0: free
   bool positive = false;                ///< physics allows no negative coefficient
   /// reflector_slip: the columns count from here on only
   bool steps = false;

@@ -25,7 +25,9 @@ constexpr double outlier_price = 40;
 Block local_block(const LocalCurve& c, std::size_t index) {
   Block block;
   block.id = EffectId{.effect = Effect::joint_curve, .joint = c.joint, .coefficients = c.knots};
-  block.parameters = 3;
+  // Size and centre; the few widths are not worth another.
+  block.parameters = 2;
+  block.margin = margin;
   block.centre_rad = c.centre_rad;
   block.width_rad = 2 * pi / static_cast<double>(c.knots);
   block.scanned = index;
@@ -75,6 +77,13 @@ void add_functions(GapSystem& system, Scanned& scanned, const std::vector<Smooth
     block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
     block.precision = 1;
     block.parameters = cost;  // of having tried so many functions
+    block.margin = margin;
+    block.function_joint = f.place.body;
+    for (const Variable* v : which) {
+      if (v->is_order) continue;
+      if (v->kind == Covariate::reading) block.function_readings.push_back(v->joint);
+      if (v->kind == Covariate::payload) block.function_load = true;
+    }
     block.scanned = scanned.functions.size();
     scanned.functions.push_back(f);
     add_block(system, block, columns);
@@ -98,6 +107,7 @@ void add_slips(GapSystem& system, const std::vector<Slip>& found, const std::vec
     block.id = EffectId{.effect = Effect::reflector_slip, .after_s = slip.after_s};
     block.candidate = candidate;
     block.parameters = 4;
+    block.margin = margin;
     block.fitted = parameters;
     add_block(system, block, columns);
   }
@@ -196,7 +206,7 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
       }
     }
   }
-  out.search = std::make_shared<SubsetSearch>(system, noise_scale2, margin);
+  out.search = std::make_shared<SubsetSearch>(system, noise_scale2);
   SubsetSearch& search = *out.search;
   Scanned scanned;
   const auto scan = [&](const Remainder& left, std::size_t per_joint) {
@@ -366,13 +376,13 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     if (refit.fit.weight[k] < 1) odd.push_back(k);
   }
-  if (odd.size() >= 2) {
+  if (!odd.empty()) {
     std::vector<std::vector<bool>> tries{std::vector<bool>(rows_.size(), true)};
     const GapSystem everything =
         gap_system(robot_, rows_, std::vector<bool>(rows_.size(), true), extended(nuisance_of(refit), &best),
                    fitted_, CandidateSet{candidates_.set, {}, {}, {}, false});
     std::vector<bool> aligned;
-    std::size_t most = 1;
+    std::size_t most = 0;
     for (std::uint8_t joint = 1; joint <= joint_count; ++joint) {
       const Eigen::VectorXd& u = place_column(everything, {joint, slot::theta}).column;
       const auto model = prepare(refit.fit.estimate.set, robot_, "diagnosis");

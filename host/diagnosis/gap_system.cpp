@@ -12,6 +12,21 @@ namespace {
 /// Less than this share of a column left after the projection: the data cannot speak of it (effects.md).
 constexpr double nothing_left = 1e-3;
 
+/// Directions of a block of which something is left (the sum of a curve's splines is the offset of its joint).
+double rank(const Eigen::MatrixXd& projected, const std::vector<Eigen::Index>& columns,
+            const Eigen::Ref<const Eigen::MatrixXd>& whole, const std::vector<Eigen::Index>& whole_index) {
+  const Eigen::Index n = static_cast<Eigen::Index>(columns.size());
+  if (n == 1) return 1;
+  Eigen::MatrixXd scaled(projected.rows(), n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index c = columns[static_cast<std::size_t>(k)];
+    scaled.col(k) = projected.col(c) / whole.col(whole_index[static_cast<std::size_t>(c)]).norm();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled,
+                                                             Eigen::EigenvaluesOnly);
+  return static_cast<double>((eigen.eigenvalues().array() > nothing_left * nothing_left).count());
+}
+
 std::vector<Place> all_places() {
   std::vector<Place> places;
   for (std::uint8_t link = 1; link <= joint_count; ++link) {
@@ -137,9 +152,14 @@ GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& row
       if (!known) out.dropped.push_back(candidate.id);
       continue;
     }
-    block.parameters = static_cast<double>(block.columns.size());
-    // The sum of a curve's splines is the offset of its joint.
-    if (candidate.id.effect == Effect::joint_curve && block.parameters > 1) block.parameters -= 1;
+    block.parameters = rank(out.columns, block.columns, candidate_columns, kept);
+    // Every arm bends: what the paper's model has needs no more than its BIC.
+    const bool usual = block.id.effect == Effect::joint_compliance || block.id.effect == Effect::link_gravity;
+    block.margin = usual ? 0 : telling_bic;
+    if (candidate.prior_rad > 0) {
+      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
+      block.parameters = 0;
+    }
     out.blocks.push_back(std::move(block));
   }
   return out;

@@ -26,6 +26,11 @@ struct Block {
   /// Prior precision of each coefficient (per square of its unit). Of blocks with a prior the evidence is taken
   /// instead of the BIC: smooth functions of many coefficients.
   double precision = 0;
+  double margin = 0;  ///< what it must gain beyond its cost to be there at all
+  /// What an unnamed function turns and what it follows: names that it contains do not stand beside it.
+  unsigned function_joint = 0;
+  std::vector<unsigned> function_readings;  ///< joints from 1
+  bool function_load = false;
   double centre_rad = 0;    ///< of a local curve
   double width_rad = 0;     ///< of a local curve: spacing of its knots; 0: no local curve
   std::size_t scanned = 0;  ///< of a local curve or an unnamed function: index into what the caller keeps

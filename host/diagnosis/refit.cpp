@@ -155,6 +155,9 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
       if (piece.id.effect == Effect::joint_compliance || piece.id.effect == Effect::backlash ||
           piece.id.effect == Effect::readout_lag)
         prior.least = 0;
+      // No effect is a hundred times its usual size: where only a part of it is known, the rest stays small.
+      if (piece.id.effect != Effect::joint_compliance && piece.id.effect != Effect::link_gravity)
+        prior.tolerance = 100 * unit_of(model.parameters[k], model.set);
       move_too(model.parameters[k], prior);
     }
   }

@@ -152,7 +152,7 @@ std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& l
         const double norm = square - w.squaredNorm();
         // One pose is no curve: nothing says that it is this joint's reading that it follows.
         if (touched < 2 || !(norm > 0.05 * square)) continue;
-        all.push_back({joint, knots, centre, b * b / norm / left.noise_scale2 - 3 * log_n});
+        all.push_back({joint, knots, centre, b * b / norm / left.noise_scale2 - 2 * log_n});
       }
     }
     std::sort(all.begin(), all.end(),
@@ -186,6 +186,7 @@ std::vector<Slip> slips(const GapSystem& system, const Remainder& left, const st
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(left.basis.cols(), 3);
   std::vector<Slip> all;
   const double log_n = std::log(std::max(2.0, system.numbers));
+  // A step of a handful of rows is a handful of outliers.
   for (Eigen::Index i = 0; i + 1 < n; ++i) {
     const Eigen::Index k = order[static_cast<std::size_t>(i)];
     Eigen::Matrix<double, 6, 3> u;
@@ -194,7 +195,7 @@ std::vector<Slip> slips(const GapSystem& system, const Remainder& left, const st
     right += u.transpose() * left.residual.segment<6>(6 * k);
     basis += left.basis.middleRows<6>(6 * k).transpose() * u;
     const Eigen::Index before = order[static_cast<std::size_t>(i + 1)];
-    if (!(time(before) < time(k)) || i < 1 || i + 2 >= n) continue;
+    if (!(time(before) < time(k)) || i < 4 || i + 6 > n) continue;
     const Eigen::Matrix3d a = normal - basis.transpose() * basis;
     const Eigen::LLT<Eigen::Matrix3d> factor(a);
     if (factor.info() != Eigen::Success) continue;

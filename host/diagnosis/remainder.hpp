@@ -37,7 +37,7 @@ struct LocalCurve {
   unsigned joint = 0;  ///< from 1
   std::size_t knots = 0;
   double centre_rad = 0;
-  double gain = 0;  ///< over three parameters: size, centre, width
+  double gain = 0;  ///< over two parameters: size and centre
 };
 std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& left,
                                      const std::vector<Observation>& rows, std::size_t per_joint);

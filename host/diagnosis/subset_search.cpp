@@ -11,8 +11,10 @@ namespace {
 
 constexpr double minus_infinity = -std::numeric_limits<double>::infinity();
 
-/// Share of a column's own information that is added to it where it has no prior, so that directions which the columns
-/// of a set leave wholly open (the sum of a curve's splines) stay at zero.
+/// Coefficients without a prior are at most some hundred of their usual sizes (precision per square unit), and never
+/// closer to free than this share of their own information: directions that the columns of a set leave open (the sum of
+/// a curve's splines, an axis that wobbles once a turn on a base that tilts) stay where they do no harm.
+constexpr double hardly_bound = 1e-4;
 constexpr double nearly_free = 1e-8;
 
 /// What is left of a column after the others, by which it counts as theirs (squared share).
@@ -22,13 +24,31 @@ bool follows_own_reading(Effect e) {
   return e == Effect::gear_harmonic || e == Effect::encoder_scale || e == Effect::joint_curve;
 }
 
+/// Would the function's own members say the same?
+bool is_part_of(const Block& function, const EffectId& id) {
+  if (id.joint != function.function_joint) return false;
+  const auto follows = [&](unsigned joint) {
+    return std::find(function.function_readings.begin(), function.function_readings.end(), joint) !=
+           function.function_readings.end();
+  };
+  switch (id.effect) {
+    case Effect::gear_harmonic:
+    case Effect::encoder_scale:
+    case Effect::joint_curve:
+      return follows(id.joint);
+    case Effect::joint_coupling:
+      return follows(id.from);
+    case Effect::nonlinear_compliance:
+      return function.function_load;
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
-SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2, double margin)
-    : system_(system),
-      scale2_(noise_scale2),
-      margin_(margin),
-      log_n_(std::log(std::max(2.0, system.numbers))) {
+SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2)
+    : system_(system), scale2_(noise_scale2), log_n_(std::log(std::max(2.0, system.numbers))) {
   gram_ = Eigen::MatrixXd::Zero(system.columns.cols(), system.columns.cols());
   gram_.selfadjointView<Eigen::Lower>().rankUpdate(system.columns.transpose(), 1 / scale2_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
@@ -37,7 +57,15 @@ SubsetSearch::SubsetSearch(const GapSystem& system, double noise_scale2, double 
 }
 
 double SubsetSearch::precision_of(const Block& block, Eigen::Index column) const {
-  return block.precision > 0 ? block.precision : nearly_free * gram_(column, column);
+  if (block.precision > 0) return block.precision;
+  const double least = nearly_free * gram_(column, column);
+  return block.margin > 0 ? std::max(hardly_bound, least) : least;
+}
+
+double SubsetSearch::margins(const Subset& subset) const {
+  double sum = 0;
+  for (const std::size_t b : subset) sum += system_.blocks[b].margin;
+  return sum;
 }
 
 void SubsetSearch::extend() {
@@ -54,6 +82,11 @@ void SubsetSearch::extend() {
 bool SubsetSearch::compatible(std::size_t a, std::size_t b) const {
   const EffectId& x = system_.blocks[a].id;
   const EffectId& y = system_.blocks[b].id;
+  for (const auto& [f, other] : {std::pair{&system_.blocks[a], &y}, std::pair{&system_.blocks[b], &x}}) {
+    if (f->function_joint != 0 && is_part_of(*f, *other)) return false;
+  }
+  if (x.effect == Effect::reflector_slip && y.effect == Effect::reflector_slip)
+    return std::abs(x.after_s - y.after_s) > 0;
   if (same_name(x, y)) {
     // Several local faults of one joint make one curve.
     return x.effect == Effect::joint_curve && system_.blocks[a].width_rad > 0 &&
@@ -226,7 +259,7 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
         t.push_back(order[k]);
         std::sort(t.begin(), t.end());
         if (!seen.insert(t).second) continue;
-        next.emplace_back(here + gains[order[k]] - margin_ * static_cast<double>(t.size()), t);
+        next.emplace_back(here + gains[order[k]] - margins(t), t);
       }
     }
     std::sort(next.begin(), next.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -255,11 +288,9 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
       if (value(removed) > value(better)) better = removed;
       const std::vector<double> gains = extensions(without);
       for (std::size_t b = 0; b < gains.size(); ++b) {
-        if (!may(b) ||
-            !(removed.gain + gains[b] - margin_ * static_cast<double>(best.blocks.size()) > value(better)))
-          continue;
         Subset exchanged = without;
         exchanged.push_back(b);
+        if (!may(b) || !(removed.gain + gains[b] - margins(exchanged) > value(better))) continue;
         const Scored scored = score(exchanged);
         if (value(scored) > value(better) + 1e-9) better = scored;
       }

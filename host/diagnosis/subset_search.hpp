@@ -29,8 +29,7 @@ struct Scored {
 class SubsetSearch {
  public:
   /// \param noise_scale2  variance of the whitened residual where the declared noise is right: 1
-  /// \param margin  what each effect must gain beyond its cost to be there at all
-  SubsetSearch(const GapSystem& system, double noise_scale2, double margin);
+  SubsetSearch(const GapSystem& system, double noise_scale2);
 
   Scored score(const Subset& subset) const;
 
@@ -56,16 +55,16 @@ class SubsetSearch {
   double noise_scale2() const { return scale2_; }
   double log_n() const { return log_n_; }
   /// Value with the margin taken off per effect: what the search maximises.
-  double value(const Scored& s) const { return s.gain - margin_ * static_cast<double>(s.blocks.size()); }
+  double value(const Scored& s) const { return s.gain - margins(s.blocks); }
+  double margins(const Subset& subset) const;
 
  private:
   double precision_of(const Block& block, Eigen::Index column) const;
 
   const GapSystem& system_;
   double scale2_;
-  double margin_;
   double log_n_;
-  double total_ = 0;  // chi-square of the whole misfit
+  double total_ = 0;         // chi-square of the whole misfit
   Eigen::MatrixXd gram_;     // over the scale
   Eigen::VectorXd product_;  // of the columns with the residual, over the scale
 };
