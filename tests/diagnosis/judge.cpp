@@ -100,7 +100,9 @@ std::string group_of(const hidden::Case& c) {
     case hidden::Row::third:
       return effect_name(c.hidden.front().id.effect);
     case hidden::Row::rough:
-      return hidden::name(c.roughness);
+      // Where the effect itself needs the column that is missing, the oracle is blind too.
+      return hidden::name(c.roughness) +
+             (hidden::needs_what_is_missing(c.hidden.front().id.effect, c.roughness) ? ", needed" : "");
     case hidden::Row::outside:
       if (c.outside->covariate[1] != flexcomp::Covariate::reading)
         return covariate_name(c.outside->covariate[1], 0) + " and an angle";
