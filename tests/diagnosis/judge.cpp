@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
+#include <chrono>
 #include <cmath>
 
 namespace judging {
@@ -56,23 +57,10 @@ bool finds_kind(const Diagnosis& d, Effect kind) {
                      [&](const FoundEffect& f) { return f.id.effect == kind; });
 }
 
-bool needs_what_is_missing(Effect kind, hidden::Roughness roughness) {
-  switch (roughness) {
-    case hidden::Roughness::no_time:
-      return kind == Effect::base_drift || kind == Effect::reflector_slip;
-    case hidden::Roughness::no_temperature:
-      return kind == Effect::thermal_growth;
-    case hidden::Roughness::no_moves:
-      return kind == Effect::backlash || kind == Effect::readout_lag;
-    default:
-      return false;
-  }
-}
-
 /// Everything decidable is named and nothing wrong is; what cannot be tested for want of a column is said to be so.
 bool as_good_as_it_can(const hidden::Case& c, const Diagnosis& d, const Oracle& oracle) {
   for (const Hidden& h : oracle.hidden) {
-    if (needs_what_is_missing(h.id.effect, c.roughness)) {
+    if (hidden::needs_what_is_missing(h.id.effect, c.roughness)) {
       const bool told = std::any_of(d.not_testable.begin(), d.not_testable.end(), [&](const NotTestable& n) {
         return n.effect == h.id.effect && !n.needs.empty();
       });
@@ -112,11 +100,17 @@ std::string group_of(const hidden::Case& c) {
     case hidden::Row::third:
       return effect_name(c.hidden.front().id.effect);
     case hidden::Row::rough:
-      return hidden::name(c.roughness);
+      // Where the effect itself needs the column that is missing, the oracle is blind too.
+      return hidden::name(c.roughness) +
+             (hidden::needs_what_is_missing(c.hidden.front().id.effect, c.roughness) ? ", needed" : "");
     case hidden::Row::outside:
       if (c.outside->covariate[1] != flexcomp::Covariate::reading)
         return covariate_name(c.outside->covariate[1], 0) + " and an angle";
       return c.outside->formula.substr(0, 4) == "bump" ? "a bump of two joints" : "two joints";
+    case hidden::Row::local:
+      return c.inside_the_bump < 3
+                 ? "1 or 2 poses inside"
+                 : (c.inside_the_bump < 6 ? "3 to 5 poses inside" : "6 or more poses inside");
     default:
       return c.arm_name;
   }
@@ -150,12 +144,15 @@ Outcome judge(const hidden::Case& c, const Oracle& oracle, const Diagnosis& d) {
     if (!h.detectable()) out.detectable = false;
     if (!out.rival.empty() && h.margin >= out.margin) continue;
     out.margin = h.margin;
+    out.untold_margin = h.untold_margin;
     out.rival = h.rival;
   }
   out.said = words_of(d);
   out.right = is_right(c, d, oracle);
   out.listed = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
                            [&](const Hidden& h) { return lists(d, h.id); });
+  out.complete = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
+                             [&](const Hidden& h) { return !h.decidable() || finds(d, h.id); });
   out.wrong = std::any_of(d.effects.begin(), d.effects.end(),
                           [&](const FoundEffect& f) { return is_wrong(f, oracle); });
   Estimate after;
@@ -174,11 +171,14 @@ Outcome judge(const hidden::Case& c) {
   DiagnoseOptions options;
   options.columns = c.columns;
   if (c.row == hidden::Row::geometry) options.start = oracle.before.calibration;
+  const auto begin = std::chrono::steady_clock::now();
   const double start = processor_seconds();
   const Diagnosis diagnosis = diagnose(c.robot, c.train, "training rows", options);
-  const double seconds = processor_seconds() - start;
+  const double processor = processor_seconds() - start;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
   Outcome out = judge(c, oracle, diagnosis);
-  out.seconds = seconds;
+  out.seconds = elapsed.count();
+  out.processor_seconds = processor;
   return out;
 }
 

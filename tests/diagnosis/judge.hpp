@@ -19,16 +19,22 @@ struct Outcome {
   bool decidable = true;         ///< all of what is hidden
   bool detectable = true;        ///< the oracle's BIC beats leaving any of it out
   double margin = 0;             ///< least over what is hidden
+  double untold_margin = 0;      ///< the same where the shape of a bump is not told
   std::string rival;             ///< of that
   bool oracle_converged = true;
 
+  /// Another name explains the data better, and by so much that nobody would name the truth.
+  bool beaten() const { return margin <= -10; }
+
   std::string said;
-  bool right = false;   ///< what the row asks for
-  bool listed = false;  ///< every hidden name is in `effects` or in a `confounded_with`
-  bool wrong = false;   ///< a name that is neither true nor confounded with an undecidable truth
+  bool right = false;     ///< what the row asks for
+  bool listed = false;    ///< every hidden name is in `effects` or in a `confounded_with`
+  bool complete = false;  ///< every decidable hidden name is in `effects`
+  bool wrong = false;     ///< a name that is neither true nor confounded with an undecidable truth
   double rms_before_m = 0, rms_oracle_m = 0, rms_m = 0;  ///< of the held-out rows
   double floor_m = 0;
-  double seconds = 0;  ///< of the processor, in this thread
+  double seconds = 0;            ///< by the clock
+  double processor_seconds = 0;  ///< of this thread
 
   double ratio() const { return rms_m / rms_oracle_m; }
   /// Squared gap of an rms.

@@ -18,6 +18,8 @@ struct Hidden {
   double margin = 0;            ///< BIC of the best other name in its place, or of none, less the oracle's
   std::string rival;            ///< that name; "nothing" where leaving it out is the best
   double detection = 0;         ///< BIC without it less the oracle's
+  /// Of a bump: the margin of one whose place, width and height are found, not told. Else the margin.
+  double untold_margin = 0;
 
   bool decidable() const { return margin >= 10; }
   bool detectable() const { return detection >= 10; }

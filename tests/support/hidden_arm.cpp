@@ -664,6 +664,19 @@ std::string name(Roughness roughness) {
   return {};
 }
 
+bool needs_what_is_missing(Kind effect, Roughness roughness) {
+  switch (roughness) {
+    case Roughness::no_time:
+      return effect == Kind::base_drift || effect == Kind::reflector_slip;
+    case Roughness::no_temperature:
+      return effect == Kind::thermal_growth;
+    case Roughness::no_moves:
+      return effect == Kind::backlash || effect == Kind::readout_lag;
+    default:
+      return false;
+  }
+}
+
 double Bump::at(double q_rad) const {
   const double x = folded(q_rad - centre_rad);
   return std::abs(x) >= width_rad / 2 ? 0 : height_rad * 0.5 * (1 + std::cos(turn * x / width_rad));
@@ -735,6 +748,13 @@ Case draw(Row row, std::uint64_t seed) {
     if ((c.roughness == Roughness::slip || c.roughness == Roughness::drift) &&
         c.hidden.front().id.effect != more) {
       c.hidden.push_back(draw_slip_or_drift(c, session, more, random));
+    }
+    // Half of the time it is the effect itself that the missing column would have shown.
+    if (random.below(2) == 0 &&
+        (c.roughness == Roughness::no_time || c.roughness == Roughness::no_temperature ||
+         c.roughness == Roughness::no_moves)) {
+      while (!needs_what_is_missing(c.hidden.front().id.effect, c.roughness))
+        c.hidden = draw_effect(c, session, random);
     }
     if (c.roughness == Roughness::no_time) c.columns.time = false;
     if (c.roughness == Roughness::no_temperature) c.columns.temperature = false;

@@ -33,7 +33,7 @@ enum class Row {
 };
 const std::vector<Row>& all_rows();
 std::string name(Row row);
-std::optional<Row> row_of(const std::string& name);
+std::optional<Row> row_of(const std::string& wanted);
 
 /// An effect by its name, with its true coefficients in the order of the catalogue's keys.
 struct Effect {
@@ -64,6 +64,8 @@ struct Bump {
 /// What is wrong with the data of a rough case.
 enum class Roughness { nothing, outliers, slip, drift, no_time, no_temperature, no_moves };
 std::string name(Roughness roughness);
+/// Whether an effect cannot be seen without the columns that this roughness takes away.
+bool needs_what_is_missing(flexcomp::Effect effect, Roughness roughness);
 
 struct Case {
   Row row = Row::none;
