@@ -139,6 +139,7 @@ struct Plan {
             const Search& search, double fitness, double random) const;
 
   PlanProblem problem_;
+  std::optional<Cell> cell_;
   std::vector<Sight> known_;
   std::vector<std::string> warnings_;
   bool payload_column_ = false;
@@ -374,14 +375,13 @@ nlohmann::ordered_json figures_json(const Criterion& criterion, const Figures& f
 
 void Plan::run() {
   const RobotFile robot_file = load_robot(robot);
-  std::optional<Cell> cell_file;
-  if (!cell.empty()) cell_file = load_cell(cell);
+  if (!cell.empty()) cell_ = load_cell(cell);
   if (!robot_file.has_noise) {
     warnings_.push_back(fmt::format("{}: no noise given; {:.3g} mm and {:.3g} deg are assumed", robot,
                                     robot_file.position_sigma_m * 1e3,
                                     degrees(robot_file.orientation_sigma_rad)));
   }
-  const Feasibility feasibility(robot_file, cell_file);
+  const Feasibility feasibility(robot_file, cell_);
   warnings_.insert(warnings_.end(), feasibility.warnings().begin(), feasibility.warnings().end());
 
   problem_.poses = poses;
@@ -593,6 +593,7 @@ void Plan::run() {
 Page Plan::page(const RobotFile& robot_file, const PoseSet& set, const std::vector<Sigma>& sigmas,
                 const Search& search, double fitness, double random) const {
   Page page;
+  page.arm = robot_file;
   page.title = fmt::format("Measurement poses for {}", robot_file.name);
   page.summary =
       fmt::format("{} poses; random ones would be {:.2f} times as bad.", set.size(), random / fitness);
@@ -607,6 +608,7 @@ Page Plan::page(const RobotFile& robot_file, const PoseSet& set, const std::vect
                  fmt::format("{:.1f} %", 100.0 * static_cast<double>(allowed_) / sampled_poses)}};
   if (!extend.empty()) page.facts.push_back({"poses measured already", fmt::format("{}", known_.size())});
   PagePlan& plan = page.plan.emplace();
+  plan.cell = cell_;
   for (const auto& [evaluations, log_fitness] : search.history()) {
     plan.progress.emplace_back(static_cast<double>(evaluations), std::exp(log_fitness));
   }

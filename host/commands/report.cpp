@@ -127,6 +127,7 @@ PageResult result_of(const std::string& text) {
 void Report::run() const {
   const RobotFile robot_file = load_robot(robot);
   Page page;
+  page.arm = robot_file;
   page.title = title.empty() ? "Calibration of " + robot_file.name : title;
   page.summary = summary;
   for (const std::string& text : facts) {

@@ -265,6 +265,7 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
     set.title = "Poses that were fitted";
     set.before = "the model at the start";
     set.after = "with what was found";
+    set.frames = d.after.frames;
     if (d.noise_floor_m > 0) set.noise_floor_m = d.noise_floor_m;
     p.poses.push_back(set);
   }

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string_view>
 #include <utility>
 
 #include "report/escape.hpp"
 #include "report/plots.hpp"
 #include "report/style.hpp"
+#include "report/web_bundle.hpp"
+#include "report/web_data.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -70,6 +73,11 @@ ErrorPairs orientations(const PagePoses& set) {
 
 std::string figure(const std::string& svg, const std::string& caption) {
   return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", svg, caption);
+}
+
+/// Drawn anew by the script: seen on paper and where there is none.
+std::string still(const std::string& drawing) {
+  return fmt::format("<div class=\"still\">{}</div>\n", drawing);
 }
 
 using Cells = std::vector<std::string>;
@@ -134,7 +142,31 @@ std::string summary_table(const PagePoses& set, const ErrorPairs& position, cons
   return out;
 }
 
-std::string poses_section(const PagePoses& set) {
+/// What was recorded at the poses, against which the rest of the errors is drawn.
+struct Covariate {
+  std::string axis;
+  std::string words;
+  std::vector<double> values;
+};
+
+std::vector<Covariate> covariates(const PagePoses& set) {
+  std::vector<Covariate> list;
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    Covariate c{fmt::format("q{} [deg]", j + 1), fmt::format("the angle of joint {}", j + 1), {}};
+    for (const PagePose& p : set.poses) c.values.push_back(degrees(p.q_rad[j]));
+    list.push_back(c);
+  }
+  for (const PageCovariate& c : set.covariates) {
+    if (c.on_paper && c.values.size() == set.poses.size()) list.push_back({c.name, c.name, c.values});
+  }
+  Covariate order{"order of the data", "the order of the data", {}};
+  for (std::size_t k = 0; k < set.poses.size(); ++k) order.values.push_back(static_cast<double>(k + 1));
+  list.push_back(order);
+  return list;
+}
+
+/// \param number  of this set, for the script; what it draws instead has the class still
+std::string poses_section(const PagePoses& set, std::size_t number) {
   std::string out = fmt::format("<section><h2>{}</h2>\n", escaped(set.title));
   if (!set.about.empty()) out += fmt::format("<p>{}</p>\n", escaped(set.about));
   if (set.poses.empty()) return out + "<p>No poses.</p></section>\n";
@@ -157,25 +189,25 @@ std::string poses_section(const PagePoses& set) {
         fmt::format("<p>{} of {} poses lie far from the rest and do not count in full: {}{}.</p>\n", outliers,
                     set.poses.size(), which, static_cast<std::size_t>(outliers) > named ? ", …" : "");
   }
-  out += "<div class=\"plots wide\">\n";
-  out += figure(plot_in_order(position), "Position error of each pose, in the order of the data.");
+  out += fmt::format("<div class=\"explore\" data-set=\"{}\"></div>\n<div class=\"plots wide\">\n", number);
+  out += still(figure(plot_in_order(position), "Position error of each pose, in the order of the data."));
   out += figure(plot_sorted(position),
-                "The same, sorted: the share of the poses whose error lies below a value.");
-  out += figure(plot_histogram(position), "How many poses have which position error.");
+                "Position error, sorted: the share of the poses whose error lies below a value.");
+  out += still(figure(plot_histogram(position), "How many poses have which position error."));
   if (!orientation.before.empty()) {
     out += figure(plot_sorted(orientation), "Orientation error, sorted.");
   }
   out +=
-      "</div>\n<h3>What is left, against each joint</h3>\n"
+      "</div>\n<div class=\"still\"><h3>What is left, against each joint and whatever else was recorded</h3>\n"
       "<p>The three components of the position error after: "
       "<span class=\"mark x\"></span> x, <span class=\"mark y\"></span> y, <span class=\"mark z\"></span> z. "
       "Noise has no shape here; a curve or a slope is an effect that the model does not have. Poses far off "
-      "the others "
-      "are drawn at the edge.</p>\n<div class=\"plots\">\n";
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    out += figure(plot_against_joint(set.poses, j), fmt::format("Joint {}.", j + 1));
+      "the others are drawn at the edge.</p>\n<div class=\"plots\">\n";
+  for (const Covariate& c : covariates(set)) {
+    out += figure(plot_against(set.poses, c.values, c.axis, c.words),
+                  fmt::format("Against {}.", escaped(c.words)));
   }
-  return out + "</div></section>\n";
+  return out + "</div></div></section>\n";
 }
 
 /// The unit that a parameter's name ends with, for people.
@@ -214,16 +246,32 @@ std::pair<std::string, std::string> with_uncertainty(double value, const std::op
   return {text(value), sigma ? text(*sigma) : "–"};
 }
 
+std::string joined(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) {
+    out += fmt::format("{}<code>{}</code>", out.empty() ? "" : ", ", escaped(name));
+  }
+  return out;
+}
+
 std::string parameter_table(const Page& page) {
   if (page.parameters.empty()) return "";
-  std::string out =
+  std::map<std::string, std::vector<std::string>> carried;
+  for (const PageConfounded& c : page.confounded) {
+    for (const std::string& by : c.with) carried[by].push_back(c.parameter);
+  }
+  std::string out = fmt::format(
       "<section><h2>Parameters</h2>\n<p>Estimates with one standard deviation. Pale: not larger than twice "
       "its own "
-      "uncertainty, so it may as well be zero.</p>\n<div class=\"scroll\"><table "
+      "uncertainty, so it may as well be zero.{}</p>\n<div class=\"scroll\"><table "
       "class=\"parameters\"><thead><tr>"
       "<th scope=\"col\">parameter</th><th scope=\"col\">value</th><th scope=\"col\">±</th><th "
       "scope=\"col\">unit</th>"
-      "<th scope=\"col\">value / ±</th></tr></thead><tbody>\n";
+      "<th scope=\"col\">value / ±</th>{}</tr></thead><tbody>\n",
+      carried.empty() ? ""
+                      : " What carries a parameter that cannot be told from it has the sum of both, as "
+                        "far as they act alike.",
+      carried.empty() ? "" : "<th scope=\"col\">carries</th>");
   for (const PageParameter& p : page.parameters) {
     const auto [value, sigma] = with_uncertainty(p.value, p.sigma);
     std::string ratio = "–";
@@ -233,19 +281,16 @@ std::string parameter_table(const Page& page) {
       pale = times < 2;
       ratio = times < 100 ? fmt::format("{:.1f}", times) : fmt::format("{:.0f}", times);
     }
-    out += fmt::format("<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+    const auto also = carried.find(p.name);
+    out += fmt::format("<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>\n",
                        pale ? " class=\"pale\"" : "", escaped(p.name), value, sigma, unit_of_name(p.name),
-                       ratio);
+                       ratio,
+                       carried.empty() ? ""
+                                       : fmt::format("<td>{}</td>", also == carried.end()
+                                                                        ? std::string()
+                                                                        : joined(also->second)));
   }
   return out + "</tbody></table></div></section>\n";
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) {
-    out += fmt::format("{}<code>{}</code>", out.empty() ? "" : ", ", escaped(name));
-  }
-  return out;
 }
 
 std::string limits_of_the_data(const Page& page) {
@@ -329,15 +374,36 @@ bool is_local(const std::string& href) {
   return !href.empty() && href.find(':') == std::string::npos && !href.starts_with("//");
 }
 
+/// Drawn by the script; where there is none, a sentence stands there.
+std::string arm_section(const Page& page, bool web) {
+  if (!page.arm || !web) return "";
+  return "<section><h2>The arm</h2>\n<div class=\"view3d\"><noscript><p>The view of the arm in 3-D needs "
+         "scripts; all numbers stand below.</p></noscript></div></section>\n";
+}
+
+/// Whether the script has something to draw.
+bool has_data(const Page& page) {
+  return page.plan || std::any_of(page.poses.begin(), page.poses.end(),
+                                  [](const PagePoses& set) { return !set.poses.empty(); });
+}
+
+// Nothing is ever fetched, whatever the script does.
+constexpr const char* closed =
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline'\">\n";
+
 }  // namespace
 
-std::string html(const Page& page) {
+bool has_web_parts() { return !web_script().empty(); }
+
+std::string html(const Page& page, bool web) {
+  web = web && has_web_parts() && has_data(page);
   std::string out = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{2}"
       "<meta name=\"viewport\" content=\"width=device-width, "
-      "initial-scale=1\">\n<title>{0}</title>\n<style>\n{1}</style>\n"
+      "initial-scale=1\">\n<title>{0}</title>\n<style>\n{1}{3}</style>\n"
       "</head>\n<body>\n<main>\n<header><h1>{0}</h1>\n",
-      escaped(page.title), page_style);
+      escaped(page.title), page_style, closed, web ? web_style() : "");
   if (!page.summary.empty()) out += fmt::format("<p class=\"lead\">{}</p>\n", escaped(page.summary));
   out += "</header>\n";
   if (!page.doubts.empty()) {
@@ -352,9 +418,11 @@ std::string html(const Page& page) {
     }
     out += "</dl>\n";
   }
+  out += arm_section(page, web);
   if (page.plan) out += plan_section(*page.plan);
   for (const PageSection& section : page.sections) out += free_section(section);
-  for (const PagePoses& set : page.poses) out += poses_section(set);
+  for (std::size_t k = 0; k < page.poses.size(); ++k) out += poses_section(page.poses[k], k);
+  for (const PageSection& section : page.further) out += free_section(section);
   out += results_table(page);
   out += limits_of_the_data(page);
   out += parameter_table(page);
@@ -365,8 +433,17 @@ std::string html(const Page& page) {
     }
   }
   if (!links.empty()) out += fmt::format("<nav><h2>Beside this page</h2><ul>\n{}</ul></nav>\n", links);
-  if (!page.made_by.empty()) out += fmt::format("<footer>{}</footer>\n", escaped(page.made_by));
-  return out + "</main>\n</body>\n</html>\n";
+  if (!page.made_by.empty()) {
+    out += fmt::format("<footer>{}{}</footer>\n", escaped(page.made_by),
+                       has_web_parts() ? "" : ", built without the 3-D view and the plots to choose from");
+  }
+  out += "</main>\n";
+  if (web) {
+    out += "<script type=\"application/json\" id=\"data\">" + web_data(page) + "</script>\n<script>";
+    out += web_script();
+    out += "</script>\n";
+  }
+  return out + "</body>\n</html>\n";
 }
 
 }  // namespace flexcomp::host

@@ -1,6 +1,8 @@
 /// \file
-/// One self-contained page about a calibration: inline SVG, no scripts, no network; light, dark and on paper. Whoever
-/// has numbers fills a Page; whatever is left empty leaves no trace on the page. All text is escaped.
+/// One self-contained page about a calibration, without network; light, dark and on paper. Text, tables and drawings
+/// (inline SVG) are made here and can be read without scripts; the script that the page carries (report/web) adds the arm
+/// in 3-D and plots to choose from. Whoever has numbers fills a Page; whatever is left empty leaves no trace on the page.
+/// All text is escaped.
 #ifndef FLEXCOMP_HOST_REPORT_PAGE_HPP
 #define FLEXCOMP_HOST_REPORT_PAGE_HPP
 
@@ -10,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "files/calibration_file.hpp"
+#include "files/cell_file.hpp"
 #include "files/robot_file.hpp"
 
 namespace flexcomp::host {
@@ -22,6 +26,14 @@ struct PagePose {
   std::optional<double> before_rad;  ///< angle of the rotation error, where orientations are known
   std::optional<double> after_rad;
   bool outlier = false;  ///< does not count in full
+  std::size_t line = 0;  ///< of the data file; 0: unknown
+};
+
+/// Something beside the joints that was recorded at every pose and is not the same at all of them.
+struct PageCovariate {
+  std::string name;            ///< with its unit: "payload [kg]"
+  std::vector<double> values;  ///< one per pose, in that unit
+  bool on_paper = true;        ///< false: among the script's choices only
 };
 
 /// A set of poses with its summary, the two plots per pose, the histogram and the residuals against each joint.
@@ -31,6 +43,9 @@ struct PagePoses {
   std::string before;  ///< what "before" is: "nominal model, frames fitted"
   std::string after;   ///< what "after" is: "calibrated model"
   std::vector<PagePose> poses;
+  std::vector<PageCovariate> covariates;
+  /// Of the measurement in which the error vectors are given, where it is not F0: where to draw them.
+  std::optional<MeasurementFrames> frames;
   /// Mean length of the measurement's own error: nothing can be seen below it. Drawn where it is given.
   std::optional<double> noise_floor_m;
 };
@@ -82,6 +97,7 @@ struct PagePlan {
   std::vector<double> payload_kg;                            ///< per pose, or empty
   std::vector<std::array<double, joint_count>> known_q_rad;  ///< measured already
   std::array<std::pair<double, double>, joint_count> limits_rad{};
+  std::optional<Cell> cell;  ///< tracker and obstacles
   std::vector<std::pair<std::string, double>>
       expected;  ///< standard deviation per parameter, unit as the name says
 };
@@ -90,6 +106,7 @@ struct Page {
   std::string title;                ///< "Calibration of staubli-tx60l"
   std::string summary;              ///< what came out, in a sentence or two for somebody in a hurry
   std::vector<std::string> doubts;  ///< why the result must not be relied on; shown first, in words
+  std::optional<RobotFile> arm;     ///< drawn in 3-D with the poses below
   std::vector<PageFact> facts;      ///< data file, poses, parameters, condition, chi-square per dof …
   std::optional<PagePlan> plan;
   std::vector<PagePoses> poses;
@@ -97,14 +114,20 @@ struct Page {
   std::vector<PageConfounded> confounded;
   std::vector<std::string> missing;  ///< parameters that these data do not know though such data could
   std::vector<std::array<double, joint_count>> cure_rad;  ///< poses that would make them known
-  std::vector<PageSection> sections;
+  std::vector<PageSection> sections;  ///< before the poses
+  std::vector<PageSection> further;   ///< after them
   std::vector<PageResult> results;
   std::vector<PageLink> links;
   std::string made_by;  ///< "flexcomp 0.1.0, 2025-01-31"
 };
 
-/// The page as one HTML document.
-std::string html(const Page& page);
+/// \return whether this program was built with the script (FLEXCOMP_REPORT_WEB)
+bool has_web_parts();
+
+/// The page as one HTML document, at most 1.5 MB whatever the number of poses: of very many, statistics and histograms
+/// take all and drawings show a part, and the page says so.
+/// \param web  with the script, where the program has it
+std::string html(const Page& page, bool web = has_web_parts());
 
 }  // namespace flexcomp::host
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "report/escape.hpp"
+#include "report/shown_poses.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -17,6 +18,10 @@ constexpr double width = 360, height = 220;
 constexpr double left = 46, right = 12, top = 12, bottom = 36;
 // A logarithmic axis where one number is this many times another: else the smaller ones lie on the axis.
 constexpr double log_from_ratio = 8;
+// More dots than this cover each other on a drawing of this size, and fill the page.
+constexpr std::size_t most_dots = 1500;
+constexpr std::size_t most_dots_of_three = 700;
+constexpr std::size_t most_steps = 400;
 
 struct Tick {
   double value;
@@ -171,14 +176,25 @@ double longest(const std::vector<std::string>& names) {
 /// A dot in a path whose lines have round ends.
 std::string dot(double x, double y) { return fmt::format("M{:.1f} {:.1f}h0", x, y); }
 
+/// Which of `count` things in a row are drawn: all, or so many evenly spaced ones.
+std::vector<std::size_t> evenly(std::size_t count, std::size_t most) {
+  std::vector<std::size_t> chosen;
+  const std::size_t drawn = std::min(count, most);
+  for (std::size_t k = 0; k < drawn; ++k)
+    chosen.push_back(drawn < 2 ? k : k * (count - 1) / (drawn - 1));
+  return chosen;
+}
+
 std::string step_line(std::vector<double> values, const Scale& scale) {
   std::sort(values.begin(), values.end());
   std::string d;
-  for (std::size_t k = 0; k < values.size(); ++k) {
+  const auto n = static_cast<double>(values.size());
+  double from = 0;
+  for (const std::size_t k : evenly(values.size(), most_steps)) {
     const double x = px(scale.at(values[k]));
-    const auto n = static_cast<double>(values.size());
-    d += fmt::format("{}{:.1f} {:.1f}V{:.1f}", k == 0 ? "M" : "L", x, py(static_cast<double>(k) / n),
-                     py(static_cast<double>(k + 1) / n));
+    const double to = static_cast<double>(k + 1) / n;
+    d += fmt::format("{}{:.1f} {:.1f}V{:.1f}", d.empty() ? "M" : "L", x, py(from), py(to));
+    from = to;
   }
   return d;
 }
@@ -246,7 +262,8 @@ std::string plot_curves(const Curves& c) {
     const Curve& curve = c.curves[k];
     const std::string kind = curve.colour.empty() ? kinds[k] : curve.colour;
     std::string line, dots, forth, back;
-    for (std::size_t n = 0; n < curve.points.size(); ++n) {
+    for (const std::size_t n : evenly(
+             curve.points.size(), curve.style == CurveStyle::dots ? most_dots : curve.points.size())) {
       const auto& [at, value] = curve.points[n];
       if (c.log_y && !(value > 0)) continue;
       const double px_at = px(x.at(at));
@@ -317,7 +334,7 @@ std::string plot_in_order(const ErrorPairs& errors) {
   }
   plot.x_axis(ticks, x, "pose");
   std::string stems, before, after;
-  for (std::size_t k = 0; k < errors.before.size(); ++k) {
+  for (const std::size_t k : evenly(errors.before.size(), most_dots)) {
     const double at = px(x.at(static_cast<double>(k + 1)));
     const double upper = py(y.at(errors.before[k])), lower = py(y.at(errors.after[k]));
     if (errors.before.size() <= 120) stems += fmt::format("M{:.1f} {:.1f}V{:.1f}", at, upper, lower);
@@ -377,13 +394,14 @@ std::string plot_histogram(const ErrorPairs& errors) {
   return plot.done();
 }
 
-std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint) {
+std::string plot_against(const std::vector<PagePose>& poses, const std::vector<double>& values,
+                         const std::string& axis, const std::string& described) {
   double reach = 0, low = HUGE_VAL, high = -HUGE_VAL;
   std::vector<double> sizes;
-  for (const PagePose& p : poses) {
-    for (const double e : p.after_m) sizes.push_back(std::abs(e) * 1e3);
-    low = std::min(low, degrees(p.q_rad[joint]));
-    high = std::max(high, degrees(p.q_rad[joint]));
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    for (const double e : poses[n].after_m) sizes.push_back(std::abs(e) * 1e3);
+    low = std::min(low, values[n]);
+    high = std::max(high, values[n]);
   }
   if (!sizes.empty()) {
     // The bulk sets the scale; what lies far off is drawn at the edge.
@@ -394,19 +412,18 @@ std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t j
   if (!(reach > 0)) reach = 1e-3;
   const double step = round_step(reach, 2);
   const Scale y{-step * std::ceil(reach / step - 1e-9), step * std::ceil(reach / step - 1e-9), false};
-  const double margin = std::max(1.0, 0.04 * (high - low));
+  const double margin = high > low ? 0.04 * (high - low) : 1;
   const Scale x{low - margin, high + margin, false};
-  const std::string name = fmt::format("q{}", joint + 1);
-  Plot plot(fmt::format("What is left of the position error against the angle of joint {}", joint + 1));
+  Plot plot("What is left of the position error against " + described);
   plot.y_axis(y.ticks(4), y, "mm");
-  plot.x_axis(x.ticks(6), x, name + " [deg]");
+  plot.x_axis(x.ticks(6), x, axis);
   static constexpr std::array<const char*, 3> kind{"dots x", "dots y", "dots z"};
   static constexpr std::array<const char*, 3> fine{"fine x", "fine y", "fine z"};
+  const std::vector<std::size_t> shown = shown_poses(poses, most_dots_of_three);
   for (std::size_t k = 0; k < 3; ++k) {
     std::string d;
-    for (const PagePose& p : poses) {
-      d += dot(px(x.at(degrees(p.q_rad[joint]))), py(std::clamp(y.at(p.after_m[k] * 1e3), 0.0, 1.0)));
-    }
+    for (const std::size_t n : shown)
+      d += dot(px(x.at(values[n])), py(std::clamp(y.at(poses[n].after_m[k] * 1e3), 0.0, 1.0)));
     plot.path(d, poses.size() > 60 ? fine[k] : kind[k]);
   }
   return plot.done();

@@ -1,6 +1,6 @@
 /// \file
 /// The plots of a page as inline SVG. Colours come from the page's style sheet by class, so that one drawing serves
-/// light, dark and paper. Drawn for the width of a phone; wider screens put several beside each other.
+/// light, dark and paper. Of very many poses a part is drawn (shown_poses()), so that a page stays small. Drawn for the width of a phone; wider screens put several beside each other.
 #ifndef FLEXCOMP_HOST_REPORT_PLOTS_HPP
 #define FLEXCOMP_HOST_REPORT_PLOTS_HPP
 
@@ -57,8 +57,13 @@ std::string plot_in_order(const ErrorPairs& errors);
 std::string plot_sorted(const ErrorPairs& errors);
 /// How many poses lie in which class of errors.
 std::string plot_histogram(const ErrorPairs& errors);
-/// The three components of the position error that is left, against each joint's angle: what has a shape is not noise.
-std::string plot_against_joint(const std::vector<PagePose>& poses, std::size_t joint);
+/// The three components of the position error that is left, against something known at every pose: what has a shape is not
+/// noise.
+/// \param values     one per pose
+/// \param axis       "q1 [deg]"
+/// \param described  what they are, for those who do not see it: "the angle of joint 1"
+std::string plot_against(const std::vector<PagePose>& poses, const std::vector<double>& values,
+                         const std::string& axis, const std::string& described);
 
 /// Named amounts of 0 or more as bars, one above the other, before and after.
 struct Bars {

@@ -3,10 +3,53 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <functional>
+#include <utility>
 
+#include "report/models.hpp"
 #include "report/parameters.hpp"
+#include "report/plots.hpp"
 
 namespace flexcomp::host {
+namespace {
+
+/// Appends what `of` gives for every row, where it is not the same for all.
+void add_covariate(PagePoses& set, const std::string& name, const std::vector<Observation>& rows,
+                   const std::function<double(const Observation&)>& of) {
+  PageCovariate c{name, {}};
+  for (const Observation& row : rows) c.values.push_back(of(row));
+  const auto [low, high] = std::minmax_element(c.values.begin(), c.values.end());
+  if (c.values.empty() || !(*high > *low)) return;
+  set.covariates.push_back(std::move(c));
+}
+
+void add_covariates(PagePoses& set, const std::vector<Observation>& rows) {
+  using Row = const Observation&;
+  add_covariate(set, "payload [kg]", rows, [](Row r) { return r.context.payload_kg; });
+  add_covariate(set, "temperature [°C]", rows, [](Row r) { return r.context.temperature_c; });
+  add_covariate(set, "time [s]", rows, [](Row r) { return r.context.time_s; });
+  static constexpr std::array<const char*, 3> forces{"force x [N]", "force y [N]", "force z [N]"};
+  for (std::size_t k = 0; k < 3; ++k)
+    add_covariate(set, forces[k], rows, [k](Row r) { return r.context.force_n[k]; });
+  const std::size_t on_paper = set.covariates.size();
+  const bool speeds = std::any_of(rows.begin(), rows.end(), [](Row r) {
+    return std::any_of(r.context.relative_speed.begin(), r.context.relative_speed.end(),
+                       [](double v) { return v != 0; });
+  });
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    if (speeds) {
+      add_covariate(set, fmt::format("last motion of joint {} (1: the fastest)", j + 1), rows,
+                    [j](Row r) { return r.context.relative_speed[j]; });
+    } else {
+      add_covariate(set, fmt::format("last direction of joint {}", j + 1), rows,
+                    [j](Row r) { return r.context.direction[j]; });
+    }
+  }
+  for (std::size_t k = on_paper; k < set.covariates.size(); ++k) set.covariates[k].on_paper = false;
+}
+
+}  // namespace
 
 PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
                      const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers) {
@@ -16,6 +59,7 @@ PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<R
   for (std::size_t k = 0; k < rows.size(); ++k) {
     PagePose pose;
     pose.q_rad = rows[k].q_rad;
+    pose.line = rows[k].line;
     for (std::size_t i = 0; i < 3; ++i) {
       pose.before_m[i] = before[k].position_m[static_cast<Eigen::Index>(i)];
       pose.after_m[i] = after[k].position_m[static_cast<Eigen::Index>(i)];
@@ -27,12 +71,14 @@ PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<R
     pose.outlier = std::find(outliers.begin(), outliers.end(), k) != outliers.end();
     set.poses.push_back(pose);
   }
+  add_covariates(set, rows);
   return set;
 }
 
 Page titled_page(const std::string& title, const RobotFile& robot) {
   Page page;
   page.title = title;
+  page.arm = robot;
   Calibration now;
   stamp(now, robot);
   page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
@@ -48,8 +94,56 @@ std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) 
 
 }  // namespace
 
+namespace {
+
+PageSection models_section(const std::vector<ModelFit>& compared) {
+  PageSection section;
+  section.title = "Which model?";
+  section.paragraphs = {
+      "The models of the paper, each fitted anew to these rows. What a model gains on the rows that it is "
+      "fitted to may be noise that it has learnt; what it gains on rows left out is the arm. Left out: each "
+      "row in turn, predicted by a fit to all the others."};
+  section.columns = {"model", "parameters", "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
+                     "largest [mm]", "chi-square per dof"};
+  const auto mm = [](double metres) { return fmt::format("{:.4f}", metres * 1e3); };
+  Curves curves{"Position error of the left-out rows over the share of rows that are further off, for each model",
+                "% of the rows that are further off",
+                "position error, left out [mm]",
+                {},
+                true,
+                {}};
+  static constexpr std::array<const char*, 4> colours{"after", "y", "z", "before"};
+  bool partly = false;
+  for (const ModelFit& m : compared) {
+    section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm(m.fitted.mean_m),
+                            mm(m.fitted.max_m), m.left_out ? mm(m.left_out->mean_m) : "–",
+                            m.left_out ? mm(m.left_out->max_m) : "–",
+                            fmt::format("{:.3g}", m.chi2_per_dof)});
+    partly = partly || !m.left_out;
+    if (!m.left_out) continue;
+    Curve curve{model_words(m.kind), {}, CurveStyle::line, colours[static_cast<std::size_t>(m.kind)], {}};
+    std::vector<double> sorted = m.left_out_m;
+    std::sort(sorted.begin(), sorted.end(), std::greater<>());
+    constexpr std::size_t most = 200;
+    const std::size_t n = sorted.size(), drawn = std::min(n, most);
+    for (std::size_t k = 0; k < drawn; ++k) {
+      const std::size_t at = drawn < 2 ? k : k * (n - 1) / (drawn - 1);
+      curve.points.push_back({100 * static_cast<double>(at) / static_cast<double>(n), sorted[at] * 1e3});
+    }
+    curves.curves.push_back(curve);
+  }
+  if (partly)
+    section.paragraphs.emplace_back(
+        "–: a parameter is known by one row alone; without that row nothing could be predicted.");
+  if (!curves.curves.empty())
+    section.figures.emplace_back(plot_curves(curves), "Rows left out, the farthest first: lower is better.");
+  return section;
+}
+
+}  // namespace
+
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
-             const std::string& data) {
+             const std::string& data, const std::vector<ModelFit>& compared) {
   Page p = titled_page("Identification of " + robot.name, robot);
   p.summary =
       gained(statistics(r.nominal, rows), r.after) + " On the poses that were fitted: validate on others.";
@@ -65,7 +159,9 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
              {"rows outside the bulk", fmt::format("{}", r.outliers.size())}};
   PagePoses set = page_poses(r.nominal, r.residuals, rows, r.outliers);
   set.title = "Poses that were fitted";
+  set.frames = r.calibration.frames;
   p.poses.push_back(set);
+  if (!compared.empty()) p.further.push_back(models_section(compared));
   add_parameters(p, r.calibration, robot);
   p.missing = r.known.missing;
   for (const CuringPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
@@ -83,6 +179,7 @@ Page page_of(const Validation& v, const std::vector<Observation>& rows, const Ro
              {"chi-square per degree of freedom", fmt::format("{:.3g}", v.chi2_per_dof())}};
   PagePoses set = page_poses(v.nominal, v.residuals, rows, {});
   set.title = "Poses that were not fitted";
+  set.frames = calibration.frames;
   p.poses.push_back(set);
   add_parameters(p, calibration, robot);
   return p;

@@ -11,12 +11,14 @@
 #include "diagnosis/held_out.hpp"
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
+#include "report/models.hpp"
 #include "report/page.hpp"
 
 namespace flexcomp::host {
 
+/// \param compared  compare_models(), or none
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
-             const std::string& data);
+             const std::string& data, const std::vector<ModelFit>& compared);
 Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
              const Calibration& calibration, const std::string& data);
 

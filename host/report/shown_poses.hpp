@@ -1,0 +1,19 @@
+/// \file
+/// Which of very many poses are drawn.
+#ifndef FLEXCOMP_HOST_REPORT_SHOWN_POSES_HPP
+#define FLEXCOMP_HOST_REPORT_SHOWN_POSES_HPP
+
+#include <cstddef>
+#include <vector>
+
+#include "report/page.hpp"
+
+namespace flexcomp::host {
+
+/// All, where they are at most `limit`. Else as many as that: the twentieth part with the largest errors after, and of the
+/// others every n-th. Ascending.
+std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::size_t limit);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,453 @@
+import {
+  AmbientLight, BoxGeometry, BufferGeometry, CapsuleGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry,
+  DirectionalLight, DoubleSide, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh,
+  MeshLambertMaterial, PerspectiveCamera, Quaternion, Scene, SphereGeometry, Vector3, WebGLRenderer,
+} from 'three';
+import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
+import {mergeGeometries} from 'three/addons/utils/BufferGeometryUtils.js';
+import {chain, measuredPoint, placed, toolFrame} from './chain.js';
+import {colours, onColours} from './colours.js';
+import {jointsOf, norm, roundDown, shown} from './data.js';
+import {check, choice, element, select} from './elements.js';
+
+const up = new Vector3(0, 1, 0);  // what three's cylinders stand along
+const vector = (p) => new Vector3(p[0], p[1], p[2]);
+
+/** Brings a body that stands on +y from 0 to 1 from one place to another. */
+function between(from, to, thickness) {
+  const along = to.clone().sub(from);
+  const length = along.length();
+  const turn = new Quaternion().setFromUnitVectors(up, length > 0 ? along.divideScalar(length) : up);
+  return new Matrix4().compose(from, turn, new Vector3(thickness, Math.max(length, 1e-9), thickness));
+}
+
+/** An arrow from 0 to 1 on +y, its shaft one thick. */
+function arrowGeometry(corners) {
+  const shaft = new CylinderGeometry(0.5, 0.5, 0.7, corners, 1, true).translate(0, 0.35, 0);
+  const tip = new ConeGeometry(1.5, 0.3, corners).translate(0, 0.85, 0);
+  return mergeGeometries([shaft, tip]);
+}
+
+/** From a length at which the usual error is well seen, by 1, 2, 5 up and down. */
+function lengthenings(usual, size) {
+  const start = roundDown((0.12 * size) / Math.max(usual, 1e-9));
+  const list = [];
+  for (let e = -2; e <= 3; ++e) for (const lead of [1, 2, 5]) list.push(lead * 10 ** (Math.floor(Math.log10(start)) + e));
+  return {list: list.filter((f) => f >= 1), start};
+}
+
+/** The arm in 3-D: error vectors before and after, or a plan with its beams and bodies. */
+export class ArmView {
+  constructor(at, data) {
+    this.data = data;
+    this.arm = data.arm;
+    // Shown one at a time.
+    this.scenes = [
+      ...(data.plan && data.plan.count > 0 ? [{plan: true, set: data.plan, number: -1}] : []),
+      ...data.sets.map((set, number) => ({plan: false, set, number})).filter((s) => s.set.count > 0),
+    ];
+    if (this.scenes.length === 0) return;
+    this.shown = {errors: 'both', bodies: true, poses: true};
+    this.renderer = new WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(35, 4 / 3, 0.01, 100);
+    this.camera.up.set(0, 0, 1);
+    this.ambient = new AmbientLight(0xffffff, 1.6);
+    this.sun = new DirectionalLight(0xffffff, 1.8);
+    this.scene.add(this.ambient, this.sun, this.sun.target);
+    const canvas = this.renderer.domElement;
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'img');
+    this.stage = element('div', {class: 'stage'}, canvas);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener('change', () => this.render());
+    // A finger that moves up or down scrolls the page; a wheel does until the view was clicked.
+    canvas.style.touchAction = 'pan-y pinch-zoom';
+    this.controls.enableZoom = false;
+    canvas.addEventListener('focus', () => { this.controls.enableZoom = true; });
+    canvas.addEventListener('blur', () => { this.controls.enableZoom = false; });
+    canvas.addEventListener('pointerdown', (event) => { this.pressed = [event.clientX, event.clientY]; });
+    canvas.addEventListener('click', (event) => this.pick(event));
+    this.panel = element('div', {class: 'controls'});
+    this.legend = element('ul', {class: 'legend'});
+    this.words = element('p', {class: 'note scale'});
+    this.readout = element('p', {class: 'note readout'});
+    at.replaceChildren(this.stage, this.legend, this.words, this.readout, this.panel);
+    this.colours = colours();
+    this.enter(this.scenes[0]);
+    new ResizeObserver(() => this.resize()).observe(this.stage);
+    onColours(() => {
+      this.colours = colours();
+      this.build();
+      this.renderNow();
+    });
+    this.resize();
+  }
+
+  enter(entered) {
+    this.now = entered;
+    this.pose = 0;
+    const {set} = entered;
+    this.points = Array.from({length: set.count}, (_, k) => vector(measuredPoint(this.arm, jointsOf(set, k), set.point)));
+    const home = chain(this.arm, new Array(6).fill(0)).map((f) => norm(f.origin));
+    this.size = Math.max(...home, ...this.points.map((p) => p.length()), 0.1);
+    if (!entered.plan) {
+      const usual = Array.from({length: set.count}, (_, k) => norm(set.error('before', k)) * 1e-3).sort((a, b) => a - b);
+      const {list, start} = lengthenings(usual[Math.floor(usual.length * 0.8)] ?? 0, this.size);
+      this.lengths = list;
+      this.length = Math.max(list.indexOf(start), 0);
+    }
+    this.fillPanel();
+    this.build();
+    this.lookFrom([0.75, -1.1, 0.55]);
+  }
+
+  fillPanel() {
+    const {set, plan} = this.now;
+    const pose = element('input', {type: 'range', min: 1, max: set.count, value: this.pose + 1,
+      oninput: (event) => this.choosePose(Number(event.target.value) - 1)});
+    this.poseSlider = pose;
+    const step = (by, text, label) => element('button', {type: 'button', 'aria-label': label,
+      onclick: () => this.choosePose((this.pose + by + set.count) % set.count)}, text);
+    const look = (from, text) => element('button', {type: 'button', onclick: () => this.lookFrom(from)}, text);
+    const redraw = (key) => (value) => {
+      this.shown[key] = value;
+      this.build();
+      this.render();
+    };
+    const titles = this.scenes.map((s, k) => [String(k), s.plan ? 'the plan' : s.set.title]);
+    const parts = [];
+    if (titles.length > 1) {
+      parts.push(select('show', titles, String(this.scenes.indexOf(this.now)), (k) => this.enter(this.scenes[Number(k)])));
+    }
+    if (!plan) {
+      parts.push(
+        choice('errors', [['before', 'before'], ['both', 'both'], ['after', 'after']], this.shown.errors, redraw('errors')),
+        element('label', {class: 'field'}, element('span', {}, 'how long errors are drawn'), element('input', {
+          type: 'range', class: 'length', min: 0, max: this.lengths.length - 1, value: this.length,
+          oninput: (event) => { this.length = Number(event.target.value); this.build(); this.render(); },
+        })));
+    }
+    parts.push(
+      element('label', {class: 'field'}, element('span', {}, 'pose in which the arm stands'), pose),
+      element('span', {class: 'buttons'}, step(-1, '◀', 'the pose before'), step(1, '▶', 'the next pose')),
+      element('span', {class: 'buttons'}, look([0.75, -1.1, 0.55], 'aslant'), look([1, 0, 0.12], 'front'),
+        look([0, -1, 0.12], 'side'), look([0.001, 0, 1], 'above'),
+        element('button', {type: 'button', 'aria-label': 'nearer', onclick: () => this.approach(0.8)}, '+'),
+        element('button', {type: 'button', 'aria-label': 'farther', onclick: () => this.approach(1.25)}, '−')));
+    if (this.arm.capsules.length > 0 || (plan && set.obstacles.length > 0)) {
+      parts.push(check('bodies (capsules)', this.shown.bodies, redraw('bodies')));
+    }
+    if (plan) parts.push(check('all poses', this.shown.poses, redraw('poses')));
+    this.panel.replaceChildren(...parts);
+  }
+
+  /** Goes to a pose of a set from elsewhere on the page. */
+  choose(number, pose) {
+    const wanted = this.scenes.find((s) => s.number === number);
+    if (!wanted) return;
+    if (wanted !== this.now) this.enter(wanted);
+    this.choosePose(pose);
+    this.stage.scrollIntoView({block: 'nearest', behavior: 'smooth'});
+  }
+
+  choosePose(pose) {
+    this.pose = Math.min(Math.max(pose, 0), this.now.set.count - 1);
+    this.poseSlider.value = this.pose + 1;
+    this.build();
+    this.render();
+  }
+
+  material(ink, opacity = 1) {
+    return new MeshLambertMaterial({color: new Color(ink), transparent: opacity < 1, opacity, depthWrite: opacity === 1});
+  }
+
+  /** Everything anew: a few dozen bodies and some instanced meshes. */
+  build() {
+    if (this.content) {
+      this.scene.remove(this.content);
+      this.content.traverse((o) => { o.geometry?.dispose(); o.material?.dispose(); });
+    }
+    this.content = new Group();
+    this.scene.add(this.content);
+    const {set, plan} = this.now;
+    this.addGround();
+    this.addArm(jointsOf(set, this.pose));
+    if (plan) this.addPlan();
+    else this.addErrors();
+    this.describe();
+  }
+
+  addGround() {
+    const c = this.colours;
+    const fixed = this.arm.capsules.filter((b) => b.frame === 0);
+    const floor = Math.min(0, ...fixed.flatMap((b) => [b.from[2], b.to[2]]));
+    this.square = roundDown(this.size / 4);
+    const half = Math.ceil((1.1 * this.size) / this.square);
+    const lines = [];
+    for (let k = -half; k <= half; ++k) {
+      const at = k * this.square;
+      const end = half * this.square;
+      lines.push(at, -end, floor, at, end, floor, -end, at, floor, end, at, floor);
+    }
+    this.addLines(lines, c.grid, 1);
+    const axis = 0.2 * this.size;
+    for (const [ink, to] of [[c.x, [axis, 0, 0]], [c.y, [0, axis, 0]], [c.z, [0, 0, axis]]]) {
+      this.addBody(arrowGeometry(8), this.material(ink), between(new Vector3(), vector(to), 0.012 * this.size));
+    }
+  }
+
+  addLines(coordinates, ink, opacity) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new Float32BufferAttribute(coordinates, 3));
+    this.content.add(new LineSegments(geometry, new LineBasicMaterial({color: new Color(ink), transparent: opacity < 1, opacity})));
+  }
+
+  addBody(geometry, material, matrix) {
+    const mesh = new Mesh(geometry, material);
+    mesh.matrixAutoUpdate = false;
+    mesh.matrix.copy(matrix);
+    this.content.add(mesh);
+    return mesh;
+  }
+
+  addRod(from, to, thickness, material) {
+    if (from.distanceTo(to) < 1e-6) return;
+    this.addBody(new CylinderGeometry(0.5, 0.5, 1, 16).translate(0, 0.5, 0), material, between(from, to, thickness));
+  }
+
+  addBall(at, radius, material) {
+    this.addBody(new SphereGeometry(radius, 20, 14), material, new Matrix4().setPosition(at));
+  }
+
+  /** Links along z and x of their frames, joints about their axes, tool and reflectors; bodies as glass around them. */
+  addArm(q) {
+    const c = this.colours;
+    const thick = 0.035 * this.size;
+    const frames = chain(this.arm, q);
+    const link = this.material(c.axis);
+    const joint = this.material(c.soft);
+    for (let i = 1; i < frames.length; ++i) {
+      const from = vector(frames[i - 1].origin);
+      const elbow = vector(frames[i].elbow);
+      this.addRod(from, elbow, thick, link);
+      this.addRod(elbow, vector(frames[i].origin), thick, link);
+      this.addBall(elbow, 0.5 * thick, link);
+      const axis = vector(frames[i - 1].z).multiplyScalar(0.9 * thick);
+      this.addRod(from.clone().sub(axis), from.clone().add(axis), 1.5 * thick, joint);
+    }
+    const flange = vector(frames[6].origin);
+    this.addBall(flange, 0.6 * thick, link);
+    const tool = toolFrame(this.arm, frames[6]);
+    const plain = this.material(c.ink);
+    const tip = vector(placed(tool, this.now.set.point ?? [0, 0, 0]));
+    this.addRod(flange, vector(tool.origin), 0.3 * thick, plain);
+    this.addRod(vector(tool.origin), tip, 0.3 * thick, plain);
+    for (const p of this.arm.reflectors) {
+      const at = vector(placed(tool, p));
+      this.addRod(vector(tool.origin), at, 0.25 * thick, plain);
+      this.addBall(at, 0.35 * thick, plain);
+    }
+    this.addBall(tip, 0.35 * thick, plain);
+    if (!this.shown.bodies) return;
+    const glass = this.material(c.axis, 0.22);
+    for (const body of this.arm.capsules) this.addCapsule(body, frames[body.frame], glass);
+  }
+
+  addCapsule(body, frame, material) {
+    const from = vector(frame ? placed(frame, body.from) : body.from);
+    const to = vector(frame ? placed(frame, body.to) : body.to);
+    if (body.radius > 4 * this.size) {
+      this.addSurface(from, to, body.radius, material);
+      return;
+    }
+    const length = from.distanceTo(to);
+    const turn = new Quaternion().setFromUnitVectors(up, length > 0 ? to.clone().sub(from).divideScalar(length) : up);
+    this.addBody(new CapsuleGeometry(body.radius, length, 8, 24), material,
+      new Matrix4().compose(from.clone().add(to).multiplyScalar(0.5), turn, new Vector3(1, 1, 1)));
+  }
+
+  /** A floor or wall is a capsule so thick that it is flat: what of it is near the arm. */
+  addSurface(from, to, radius, material) {
+    const along = to.clone().sub(from);
+    const t = along.lengthSq() > 0 ? Math.min(Math.max(-from.dot(along) / along.lengthSq(), 0), 1) : 0;
+    const axis = from.clone().addScaledVector(along, t);
+    const normal = axis.clone().negate().normalize();
+    const at = axis.addScaledVector(normal, radius);
+    const flat = material.clone();
+    flat.side = DoubleSide;
+    this.addBody(new CircleGeometry(1.6 * this.size, 48), flat, new Matrix4().compose(at,
+      new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal), new Vector3(1, 1, 1)));
+  }
+
+  addErrors() {
+    const {set} = this.now;
+    const c = this.colours;
+    const many = set.count > 500;
+    const factor = this.lengths[this.length] * 1e-3;
+    const thick = (many ? 0.0025 : 0.006) * this.size;
+    const dots = new InstancedMesh(new SphereGeometry(0.8 * thick, many ? 5 : 10, many ? 4 : 8), this.material(c.soft), set.count);
+    const matrix = new Matrix4();
+    this.points.forEach((p, k) => dots.setMatrixAt(k, matrix.makeTranslation(p.x, p.y, p.z)));
+    this.content.add(dots);
+    for (const which of ['before', 'after']) {
+      if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
+      const arrows = new InstancedMesh(arrowGeometry(many ? 4 : 8), this.material(c[which]), set.count);
+      this.points.forEach((p, k) => {
+        const to = vector(set.errorInBase(which, k)).multiplyScalar(factor);
+        // A short arrow is a thin one, or it would be a disc.
+        arrows.setMatrixAt(k, between(p, to.clone().add(p), Math.min(thick, 0.25 * to.length())));
+      });
+      this.content.add(arrows);
+    }
+  }
+
+  addPlan() {
+    const plan = this.now.set;
+    const c = this.colours;
+    const skeleton = (poses) => {
+      const lines = [];
+      for (let k = 0; k < poses.count; ++k) {
+        const frames = chain(this.arm, jointsOf(poses, k));
+        const stops = frames.flatMap((f) => (f.elbow ? [f.elbow, f.origin] : [f.origin]));
+        stops.push(toolFrame(this.arm, frames[6]).origin);
+        for (let s = 1; s < stops.length; ++s) lines.push(...stops[s - 1], ...stops[s]);
+      }
+      return lines;
+    };
+    const reflectors = (k) => {
+      const tool = toolFrame(this.arm, chain(this.arm, jointsOf(plan, k))[6]);
+      return this.arm.reflectors.length > 0 ? this.arm.reflectors.map((p) => placed(tool, p)) : [tool.origin];
+    };
+    if (this.shown.poses) {
+      this.addLines(skeleton(plan), c.after, 0.45);
+      if (plan.known.count > 0) this.addLines(skeleton(plan.known), c.before, 0.35);
+      const dots = this.material(c.after);
+      for (const p of this.points) this.addBall(p, 0.012 * this.size, dots);
+    }
+    if (this.shown.bodies) {
+      const glass = this.material(c.soft, 0.3);
+      for (const body of plan.obstacles) this.addCapsule(body, null, glass);
+    }
+    if (!plan.tracker) return;
+    const tracker = vector(plan.tracker);
+    const head = 0.05 * this.size;
+    this.addBody(new BoxGeometry(1.2 * head, 1.2 * head, 2 * head), this.material(c.soft),
+      new Matrix4().setPosition(tracker.clone().setZ(tracker.z - 1.2 * head)));
+    this.addBall(tracker, 0.5 * head, this.material(c.y));
+    const beams = this.material(c.y);
+    for (const p of reflectors(this.pose)) this.addRod(tracker, vector(p), 0.006 * this.size, beams);
+    if (!this.shown.poses) return;
+    const faint = [];
+    for (let k = 0; k < plan.count; ++k) for (const p of reflectors(k)) faint.push(...plan.tracker, ...p);
+    this.addLines(faint, c.y, 0.25);
+  }
+
+  describe() {
+    const {set, plan} = this.now;
+    const item = (mark, text) => element('li', {}, element('span', {class: `mark ${mark}`}), ` ${text}`);
+    const mm = (metres) => `${shown(metres * 1e3)} mm`;
+    const list = [];
+    if (plan) {
+      list.push(item('after', 'planned poses'));
+      if (set.known.count > 0) list.push(item('known', 'measured already'));
+      if (set.tracker) list.push(item('beam', 'beams from the instrument to the reflectors'));
+    } else {
+      if (this.shown.errors !== 'after') list.push(item('before', `error before: ${set.beforeIs}`));
+      if (this.shown.errors !== 'before') list.push(item('after', `error after: ${set.afterIs}`));
+    }
+    if (this.shown.bodies && (this.arm.capsules.length > 0 || (plan && set.obstacles.length > 0))) {
+      list.push(item('body', 'glass: bodies that must not touch or stand in a beam'));
+    }
+    list.push(element('li', {}, 'axes of the base: ', element('span', {class: 'mark x'}), ' x ',
+      element('span', {class: 'mark y'}), ' y ', element('span', {class: 'mark z'}), ' z'));
+    this.legend.replaceChildren(...list);
+    const squares = `One square of the grid: ${mm(this.square)} of the arm`;
+    if (plan) {
+      this.words.textContent = `${squares}. The arm with its bodies stands in the pose chosen below; the others are lines.`;
+    } else {
+      const factor = this.lengths[this.length];
+      this.words.textContent = `Errors are drawn ${factor.toLocaleString('en')} times as long as they are. ${squares}, `
+        + `${mm(this.square / factor)} of error. The arm is the nominal one.`
+        + (set.count < set.total ? ` ${set.count} of ${set.total} poses are drawn.` : '');
+    }
+    const q = Array.from(jointsOf(set, this.pose), (v, j) => `q${j + 1} ${((v * 180) / Math.PI).toFixed(1)}°`).join(', ');
+    const said = [element('b', {}, `Pose ${plan ? this.pose + 1 : set.number[this.pose]}`), ` of ${plan ? set.count : set.total}`];
+    if (plan) {
+      if (set.payload.length > 0) said.push(`, with ${set.payload[this.pose]} kg`);
+    } else {
+      if (set.line.length > 0) said.push(` (line ${set.line[this.pose]})`);
+      said.push(`: ${shown(norm(set.error('before', this.pose)))} mm before, ${shown(norm(set.error('after', this.pose)))} mm after`);
+    }
+    this.readout.replaceChildren(...said, `; ${q}`);
+    this.renderer.domElement.setAttribute('aria-label', plan
+      ? `The arm in pose ${this.pose + 1} of ${set.count} of the plan, with bodies and beams`
+      : `The arm with the position errors of ${set.count} poses as arrows, ${this.words.textContent}`);
+  }
+
+  /** A click, not the end of a turn: the nearest measured point. */
+  pick(event) {
+    if (!this.pressed || Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) > 4) return;
+    const box = this.renderer.domElement.getBoundingClientRect();
+    let best = 14;
+    let found = -1;
+    this.points.forEach((p, k) => {
+      const at = p.clone().project(this.camera);
+      const d = Math.hypot(box.left + (0.5 + 0.5 * at.x) * box.width - event.clientX,
+        box.top + (0.5 - 0.5 * at.y) * box.height - event.clientY);
+      if (d < best) { best = d; found = k; }
+    });
+    if (found >= 0) this.choosePose(found);
+  }
+
+  lookFrom(from) {
+    const places = [new Vector3(), ...this.points];
+    if (this.now.plan && this.now.set.tracker) places.push(vector(this.now.set.tracker));
+    if (this.now.plan) chain(this.arm, jointsOf(this.now.set, 0)).forEach((f) => places.push(vector(f.origin)));
+    const low = places.reduce((a, p) => a.min(p), places[0].clone());
+    const high = places.reduce((a, p) => a.max(p), places[0].clone());
+    const middle = low.clone().add(high).multiplyScalar(0.5);
+    const radius = 0.5 * low.distanceTo(high) + 0.12 * this.size;
+    const narrow = Math.min(1, this.camera.aspect);
+    const distance = (0.92 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    this.controls.target.copy(middle);
+    this.camera.position.copy(middle).addScaledVector(vector(from).normalize(), distance);
+    this.camera.near = distance / 100;
+    this.camera.far = distance * 20;
+    this.camera.updateProjectionMatrix();
+    this.from = from;
+    this.controls.update();
+    this.render();
+  }
+
+  approach(factor) {
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    this.controls.update();
+    this.render();
+  }
+
+  resize() {
+    const {clientWidth: width, clientHeight: height} = this.stage;
+    if (!(width > 0 && height > 0)) return;
+    const first = this.wide === undefined;
+    this.wide = width;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    if (first) this.lookFrom(this.from);
+    this.renderNow();
+  }
+
+  render() {
+    this.asked ??= requestAnimationFrame(() => this.renderNow());
+  }
+
+  renderNow() {
+    if (this.asked !== undefined) cancelAnimationFrame(this.asked);
+    this.asked = undefined;
+    this.sun.position.copy(this.camera.position);
+    this.sun.target.position.copy(this.controls.target);
+    this.renderer.render(this.scene, this.camera);
+  }
+}
