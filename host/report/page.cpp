@@ -387,6 +387,10 @@ bool has_data(const Page& page) {
                                   [](const PagePoses& set) { return !set.poses.empty(); });
 }
 
+// Bytes, with some room for what closes the page; and poses for the script.
+constexpr std::size_t largest_page = 1490000;
+constexpr std::size_t most_drawn = 3000;
+
 // Nothing is ever fetched, whatever the script does.
 constexpr const char* closed =
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
@@ -439,7 +443,11 @@ std::string html(const Page& page, bool web) {
   }
   out += "</main>\n";
   if (web) {
-    out += "<script type=\"application/json\" id=\"data\">" + web_data(page) + "</script>\n<script>";
+    const std::size_t taken = out.size() + web_script().size();
+    std::string data = web_data(page, most_drawn);
+    for (std::size_t most = most_drawn / 2; taken + data.size() > largest_page && most > 50; most /= 2)
+      data = web_data(page, most);
+    out += "<script type=\"application/json\" id=\"data\">" + data + "</script>\n<script>";
     out += web_script();
     out += "</script>\n";
   }

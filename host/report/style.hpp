@@ -34,7 +34,8 @@ p { margin: .4rem 0; max-width: 46rem; }
 dt { color: var(--soft); font-size: .8rem; } dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .6rem 0; }
 th, td { padding: .15rem .8rem .15rem 0; text-align: right; white-space: nowrap; }
-th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--soft); font-weight: 400; font-size: .85rem; }
+th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--soft); font-weight: 400; font-size: .85rem;
+  white-space: normal; vertical-align: bottom; }
 tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
 .parameters { font-size: .9rem; } .parameters :is(td, th):nth-child(4) { text-align: left; }
 .scroll { overflow-x: auto; }
@@ -60,7 +61,7 @@ path.x { stroke: var(--x); } path.y { stroke: var(--y); } path.z { stroke: var(-
 code { font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: .9em; } a { color: var(--after); }
 footer { color: var(--soft); font-size: .85rem; margin: 2.5rem 0 1rem; border-top: 1px solid var(--grid); padding-top: .5rem; }
 @media print {
-  body { font-size: 10pt; } main { max-width: none; padding: 0; } .plots { grid-template-columns: 1fr 1fr; }
+  body { font-size: 10pt; } main { max-width: none; padding: 0; } .plots, .plots.wide { grid-template-columns: 1fr 1fr; }
   figure, tr, .doubts, .facts div { break-inside: avoid; } h2, h3 { break-after: avoid; } .scroll { overflow: visible; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }

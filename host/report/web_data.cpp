@@ -13,17 +13,16 @@ namespace flexcomp::host {
 namespace {
 
 // Whole numbers of these are short, and finer than anything that can be drawn.
-constexpr double joint_unit_rad = radians(1e-4);
+constexpr double joint_unit_rad = radians(1e-3);
 constexpr double error_unit_m = 1e-8;
 constexpr double angle_unit_rad = radians(1e-6);
-constexpr std::size_t most_poses = 3000;
 
 using Json = nlohmann::ordered_json;
 
-/// Six significant digits: what is drawn needs no more.
-double short_number(double v) {
+/// What is drawn needs no more digits than these.
+double short_number(double v, int digits = 6) {
   if (!std::isfinite(v) || v == 0) return 0;
-  const double power = std::pow(10, 5 - std::floor(std::log10(std::abs(v))));
+  const double power = std::pow(10, digits - 1 - std::floor(std::log10(std::abs(v))));
   return std::round(v * power) / power;
 }
 
@@ -44,7 +43,6 @@ Json joints(const std::vector<std::array<double, joint_count>>& poses) {
   return list;
 }
 
-/// Frame, both ends, radius.
 Json bodies(const std::vector<Capsule>& capsules) {
   Json list = Json::array();
   for (const Capsule& c : capsules) {
@@ -82,7 +80,6 @@ Json set_json(const PagePoses& set, std::size_t limit) {
   for (const std::size_t k : rows) {
     const PagePose& p = set.poses[k];
     number.push_back(k + 1);
-    if (lines) line.push_back(p.line);
     if (p.outlier) outlier.push_back(number.size() - 1);
     append(q, p.q_rad);
     for (const double e : p.before_m) before.push_back(counted(e, error_unit_m));
@@ -93,7 +90,15 @@ Json set_json(const PagePoses& set, std::size_t limit) {
   }
   // 1, 2, 3 … need not be said.
   if (rows.size() < set.poses.size()) j["number"] = number;
-  j["line"] = line;
+  // A file without gaps is its first line and a count.
+  bool gapless = lines;
+  for (const std::size_t k : rows) gapless = gapless && set.poses[k].line == set.poses[rows[0]].line + k - rows[0];
+  if (gapless && !rows.empty()) {
+    j["first_line"] = set.poses[rows[0]].line - rows[0];
+  } else if (lines) {
+    for (const std::size_t k : rows) line.push_back(set.poses[k].line);
+    j["line"] = line;
+  }
   j["outlier"] = outlier;
   j["q"] = q;
   j["before"] = before;
@@ -103,8 +108,17 @@ Json set_json(const PagePoses& set, std::size_t limit) {
   if (set.noise_floor_m) j["floor_mm"] = short_number(*set.noise_floor_m * 1e3);
   j["covariates"] = Json::array();
   for (const PageCovariate& c : set.covariates) {
+    // To the thousandth part of the largest: a time of the day keeps its seconds, a share its thousandths.
+    double largest = 0;
+    for (const double v : c.values) largest = std::max(largest, std::abs(v));
+    const double unit = largest > 0 ? std::pow(10, std::floor(std::log10(largest)) - 3) : 1;
     Json values = Json::array();
-    for (const std::size_t k : rows) values.push_back(k < c.values.size() ? short_number(c.values[k]) : 0.0);
+    for (const std::size_t k : rows) {
+      const double v = k < c.values.size() ? std::round(c.values[k] / unit) * unit : 0;
+      // A whole number where it is one: shorter.
+      v == std::round(v) && std::abs(v) < 1e9 ? values.push_back(static_cast<std::int64_t>(v))
+                                              : values.push_back(short_number(v, 5));
+    }
     j["covariates"].push_back({{"name", c.name}, {"values", values}});
   }
   if (set.frames) {
@@ -125,7 +139,7 @@ Json plan_json(const PagePlan& plan) {
 
 }  // namespace
 
-std::string web_data(const Page& page) {
+std::string web_data(const Page& page, std::size_t most) {
   Json j{{"joint_unit_deg", degrees(joint_unit_rad)},
          {"error_unit_mm", error_unit_m * 1e3},
          {"angle_unit_deg", degrees(angle_unit_rad)},
@@ -135,7 +149,7 @@ std::string web_data(const Page& page) {
   for (const PagePoses& set : page.poses) filled += set.poses.empty() ? 0 : 1;
   // Numbered as on the page: a set without poses takes its place too.
   for (const PagePoses& set : page.poses)
-    j["sets"].push_back(set_json(set, most_poses / std::max<std::size_t>(filled, 1)));
+    j["sets"].push_back(set_json(set, most / std::max<std::size_t>(filled, 1)));
   if (page.plan) j["plan"] = plan_json(*page.plan);
   const std::string text = j.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::string safe;

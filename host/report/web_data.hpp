@@ -3,6 +3,7 @@
 #ifndef FLEXCOMP_HOST_REPORT_WEB_DATA_HPP
 #define FLEXCOMP_HOST_REPORT_WEB_DATA_HPP
 
+#include <cstddef>
 #include <string>
 
 #include "report/page.hpp"
@@ -10,8 +11,8 @@
 namespace flexcomp::host {
 
 /// JSON that may stand in a <script> element: no '<' in it. Keys and units are those of report/web/src/data.js, which
-/// reads it. Of more than 3,000 poses in all, shown_poses() says which are in it.
-std::string web_data(const Page& page);
+/// reads it. Of more poses than `most` in all sets together, shown_poses() says which are in it.
+std::string web_data(const Page& page, std::size_t most);
 
 }  // namespace flexcomp::host
 

@@ -24,7 +24,7 @@ class PoseSet {
     this.turnedAfter = scaled(json.turned_after, units.angle_unit_deg);
     this.floor = json.floor_mm;
     this.number = json.number ?? Array.from({length: this.count}, (_, k) => k + 1);
-    this.line = json.line;
+    this.line = json.line ?? (json.first_line === undefined ? [] : this.number.map((n) => json.first_line + n - 1));
     this.outlier = new Set(json.outlier);
     this.turn = json.turn;  // from the frame of the measurement to F0
     this.point = json.point ?? [0, 0, 0];  // measured, in Ftool

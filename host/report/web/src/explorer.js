@@ -1,6 +1,6 @@
 import uPlot from 'uplot';
 import {colours, onColours} from './colours.js';
-import {shown} from './data.js';
+import {roundDown, shown} from './data.js';
 import {check, choice, element, select} from './elements.js';
 
 // As plots.cpp: a logarithmic axis where one number is this many times another.
@@ -121,24 +121,35 @@ export class Explorer {
       grid: {stroke: c.grid, width: 1}, ticks: {stroke: c.axis, width: 1, size: 4}, ...more,
     });
     const plain = (u, splits) => splits.map((v) => (v === null ? '' : String(Number(v.toPrecision(6)))));
-    // 1, 2 and 5 of each decade are named.
-    const decades = (u, splits) => splits.map((v) => (/^[125]/.test((v ?? 0).toExponential()) ? Number(v.toPrecision(3)) : null));
-    const distance = {filter: decades};
+    // Of each decade 1, 2 and 5 are named where there is room, else 1 alone.
+    const decades = (u, splits, axis) => {
+      const scale = u.scales[u.axes[axis].scale];
+      const room = (axis === 0 ? u.over.clientWidth : 3 * u.over.clientHeight) / Math.log10(scale.max / scale.min);
+      const named = room > 120 ? /^[125]/ : /^1/;
+      return splits.map((v) => (v !== null && named.test(v.toExponential(3)) ? v : null));
+    };
+    const log125 = {filter: decades, grid: {stroke: c.grid, width: 1, filter: decades},
+      ticks: {stroke: c.axis, width: 1, size: 4, filter: decades}};
+    // From one round number to another.
+    const logRange = (u, low, high) => {
+      const up = roundDown(high);
+      return [roundDown(low), up >= high * 0.999 ? up : roundDown(high * 2.5)];
+    };
     return {
       width: Math.max(at.clientWidth, 200), height, legend: {show: false}, padding: [10, 12, 0, 0],
       cursor: {drag: {x: false, y: false}, points: {show: false}, y: false, x: false},
       scales: {
-        x: {time: false, distr: logX ? 3 : 1, ...(logX ? {} : {range: (u, low, high) => {
+        x: {time: false, distr: logX ? 3 : 1, range: logX ? (u, low, high) => [low, high] : (u, low, high) => {
           const margin = high > low ? 0.03 * (high - low) : 1;
           return hooks.stepped ? [low, high] : [low - margin, high + margin];
-        }})},
-        y: {distr: log ? 3 : 1, ...(log ? {} : {range: (u, low, high) => {
+        }},
+        y: {distr: log ? 3 : 1, range: log ? logRange : (u, low, high) => {
           const margin = (high > low ? 0.06 * (high - low) : 1);
           return this.signed && !yCounts ? [low - margin, high + margin] : [0, high + margin];
-        }})},
+        }},
       },
-      axes: [axis(x, {size: 34, values: plain, ...(logX ? distance : {})}),
-        axis(y, {size: 52, values: plain, ...(log ? distance : {})})],
+      axes: [axis(x, {size: 34, values: plain, ...(logX ? log125 : {})}),
+        axis(y, {size: 52, values: plain, ...(log ? log125 : {})})],
       series: [{label: x}, ...series],
       hooks: hooks.list,
     };
@@ -161,7 +172,7 @@ export class Explorer {
     const after = set.quantity('after', this.kind);
     let near = -1;
     const options = this.options(this.scatterAt, c, {
-      x: covariate.name, y: `${this.kind === 'size' || this.kind === 'turned' ? '' : `${this.kind} `}[${unit}]`, log: this.log,
+      x: covariate.name, y: `${this.signed ? `${this.kind} of the ` : ''}error [${unit}]`, log: this.log,
       series: [this.series('before', c.before, {paths: () => null}), this.series('after', c.after, {paths: () => null})],
       hooks: {list: {
         setCursor: [(u) => { near = this.read(u, order, covariate, unit); }],

@@ -28,12 +28,14 @@ function arrowGeometry(corners) {
   return mergeGeometries([shaft, tip]);
 }
 
-/** From a length at which the usual error is well seen, by 1, 2, 5 up and down. */
-function lengthenings(usual, size) {
-  const start = roundDown((0.12 * size) / Math.max(usual, 1e-9));
+/** How many times as long an error of the usual size is well seen. */
+const lengthening = (usual, size) => Math.max(roundDown((0.2 * size) / Math.max(usual, 1e-9)), 1);
+
+/** 1, 2, 5, 10 … from one to the other. */
+function steps(from, to) {
   const list = [];
-  for (let e = -2; e <= 3; ++e) for (const lead of [1, 2, 5]) list.push(lead * 10 ** (Math.floor(Math.log10(start)) + e));
-  return {list: list.filter((f) => f >= 1), start};
+  for (let e = Math.floor(Math.log10(from)); 10 ** e <= to; ++e) list.push(...[1, 2, 5].map((lead) => lead * 10 ** e));
+  return list.filter((v) => v >= from * 0.999 && v <= to * 1.001);
 }
 
 /** The arm in 3-D: error vectors before and after, or a plan with its beams and bodies. */
@@ -92,14 +94,30 @@ export class ArmView {
     const home = chain(this.arm, new Array(6).fill(0)).map((f) => norm(f.origin));
     this.size = Math.max(...home, ...this.points.map((p) => p.length()), 0.1);
     if (!entered.plan) {
-      const usual = Array.from({length: set.count}, (_, k) => norm(set.error('before', k)) * 1e-3).sort((a, b) => a - b);
-      const {list, start} = lengthenings(usual[Math.floor(usual.length * 0.8)] ?? 0, this.size);
-      this.lengths = list;
-      this.length = Math.max(list.indexOf(start), 0);
+      // What is left is far shorter: alone it is drawn longer.
+      const [before, after] = ['before', 'after'].map((which) => this.usual(which));
+      this.fitting = {before: lengthening(before, this.size), after: lengthening(after, this.size)};
+      this.fitting.both = this.fitting.before;
+      const low = Math.min(this.fitting.before, this.fitting.after) / 20;
+      this.lengths = steps(Math.max(low, 1), Math.max(this.fitting.before, this.fitting.after) * 20);
+      this.fitLength();
     }
     this.fillPanel();
     this.build();
     this.lookFrom([0.75, -1.1, 0.55]);
+  }
+
+  /** Four of five errors are shorter, m. */
+  usual(which) {
+    const {set} = this.now;
+    const sizes = Array.from({length: set.count}, (_, k) => norm(set.error(which, k)) * 1e-3).sort((a, b) => a - b);
+    return sizes[Math.floor(sizes.length * 0.8)] ?? 0;
+  }
+
+  fitLength() {
+    const wanted = this.fitting[this.shown.errors];
+    this.length = Math.max(this.lengths.findIndex((v) => v >= wanted * 0.999), 0);
+    if (this.lengthSlider) this.lengthSlider.value = this.length;
   }
 
   fillPanel() {
@@ -121,12 +139,18 @@ export class ArmView {
       parts.push(select('show', titles, String(this.scenes.indexOf(this.now)), (k) => this.enter(this.scenes[Number(k)])));
     }
     if (!plan) {
+      this.lengthSlider = element('input', {
+        type: 'range', class: 'length', min: 0, max: this.lengths.length - 1, value: this.length,
+        oninput: (event) => { this.length = Number(event.target.value); this.build(); this.render(); },
+      });
       parts.push(
-        choice('errors', [['before', 'before'], ['both', 'both'], ['after', 'after']], this.shown.errors, redraw('errors')),
-        element('label', {class: 'field'}, element('span', {}, 'how long errors are drawn'), element('input', {
-          type: 'range', class: 'length', min: 0, max: this.lengths.length - 1, value: this.length,
-          oninput: (event) => { this.length = Number(event.target.value); this.build(); this.render(); },
-        })));
+        choice('errors', [['before', 'before'], ['both', 'both'], ['after', 'after']], this.shown.errors, (which) => {
+          this.shown.errors = which;
+          this.fitLength();
+          this.build();
+          this.render();
+        }),
+        element('label', {class: 'field'}, element('span', {}, 'how long errors are drawn'), this.lengthSlider));
     }
     parts.push(
       element('label', {class: 'field'}, element('span', {}, 'pose in which the arm stands'), pose),
@@ -193,7 +217,7 @@ export class ArmView {
     this.addLines(lines, c.grid, 1);
     const axis = 0.2 * this.size;
     for (const [ink, to] of [[c.x, [axis, 0, 0]], [c.y, [0, axis, 0]], [c.z, [0, 0, axis]]]) {
-      this.addBody(arrowGeometry(8), this.material(ink), between(new Vector3(), vector(to), 0.012 * this.size));
+      this.addBody(arrowGeometry(8), this.material(ink), between(new Vector3(), vector(to), 0.009 * this.size));
     }
   }
 
@@ -292,7 +316,10 @@ export class ArmView {
     this.content.add(dots);
     for (const which of ['before', 'after']) {
       if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
-      const arrows = new InstancedMesh(arrowGeometry(many ? 4 : 8), this.material(c[which]), set.count);
+      const material = this.material(c[which]);
+      material.emissive.set(c[which]);  // as the legend has it, also where no light falls
+      material.emissiveIntensity = 0.5;
+      const arrows = new InstancedMesh(arrowGeometry(many ? 4 : 8), material, set.count);
       this.points.forEach((p, k) => {
         const to = vector(set.errorInBase(which, k)).multiplyScalar(factor);
         // A short arrow is a thin one, or it would be a disc.
@@ -400,18 +427,34 @@ export class ArmView {
     if (found >= 0) this.choosePose(found);
   }
 
+  /** Turns the view and comes as near as still shows all points, the arm, and the instrument. */
   lookFrom(from) {
-    const places = [new Vector3(), ...this.points];
-    if (this.now.plan && this.now.set.tracker) places.push(vector(this.now.set.tracker));
-    if (this.now.plan) chain(this.arm, jointsOf(this.now.set, 0)).forEach((f) => places.push(vector(f.origin)));
-    const low = places.reduce((a, p) => a.min(p), places[0].clone());
-    const high = places.reduce((a, p) => a.max(p), places[0].clone());
-    const middle = low.clone().add(high).multiplyScalar(0.5);
-    const radius = 0.5 * low.distanceTo(high) + 0.12 * this.size;
-    const narrow = Math.min(1, this.camera.aspect);
-    const distance = (0.92 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    const {set, plan} = this.now;
+    const places = [new Vector3(), ...this.points, ...chain(this.arm, jointsOf(set, this.pose)).map((f) => vector(f.origin))];
+    if (plan && set.tracker) places.push(vector(set.tracker));
+    const towards = vector(from).normalize();
+    this.camera.position.copy(towards);
+    this.camera.lookAt(0, 0, 0);
+    this.camera.updateMatrixWorld();
+    const [right, above] = [0, 1].map((k) => new Vector3().setFromMatrixColumn(this.camera.matrixWorld, k));
+    const tall = 0.92 * Math.tan((this.camera.fov * Math.PI) / 360);
+    const wide = tall * this.camera.aspect;
+    // Each place must lie inside the pyramid of the view: middle and distance follow from the outermost ones, first
+    // without perspective.
+    const extent = (axis) => {
+      const at = places.map((p) => p.dot(axis));
+      return [at.reduce((x, y) => Math.min(x, y)), at.reduce((x, y) => Math.max(x, y))];
+    };
+    const middle = new Vector3();
+    for (const axis of [right, above, towards]) middle.addScaledVector(axis, extent(axis).reduce((x, y) => x + y) / 2);
+    let distance = 0.3 * this.size;
+    for (const p of places) {
+      const at = p.clone().sub(middle);
+      const depth = at.dot(towards) + 0.08 * this.size;
+      distance = Math.max(distance, depth + Math.abs(at.dot(right)) / wide, depth + Math.abs(at.dot(above)) / tall);
+    }
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(vector(from).normalize(), distance);
+    this.camera.position.copy(middle).addScaledVector(towards, distance);
     this.camera.near = distance / 100;
     this.camera.far = distance * 20;
     this.camera.updateProjectionMatrix();

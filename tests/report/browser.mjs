@@ -1,0 +1,85 @@
+/** A headless Chromium that draws WebGL in software, and pages in it that note whatever goes wrong. */
+import {createRequire} from 'node:module';
+import {join} from 'node:path';
+import {pathToFileURL} from 'node:url';
+
+const {chromium} = createRequire(join(process.env.FLEXCOMP_PACKAGES, 'package.json'))('playwright-core');
+
+const quiet = ['--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+  '--disable-sync'];
+const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+
+export function launch({webgl = true} = {}) {
+  return chromium.launch({
+    executablePath: process.env.FLEXCOMP_CHROMIUM,
+    // A browser that root starts has no sandbox.
+    chromiumSandbox: process.getuid() !== 0,
+    args: [...quiet, ...(webgl ? software : ['--disable-3d-apis'])],
+  });
+}
+
+/** Opens a file; `troubles` collects console errors, exceptions and whatever was asked of a network. */
+export async function open(browser, file, {width = 1280, scheme = 'light', scripts = true} = {}) {
+  const context = await browser.newContext({
+    viewport: {width, height: 900}, colorScheme: scheme, javaScriptEnabled: scripts, hasTouch: width < 600,
+  });
+  const page = await context.newPage();
+  const troubles = [];
+  const own = pathToFileURL(file).href;
+  page.on('console', (m) => {
+    // What a software renderer says of its own speed is no fault of the page.
+    if (['error', 'warning'].includes(m.type()) && !/GPU stall|swiftshader/i.test(m.text())) troubles.push(`console: ${m.text()}`);
+  });
+  page.on('pageerror', (e) => troubles.push(`exception: ${e.message}`));
+  page.on('request', (r) => { if (r.url() !== own) troubles.push(`request: ${r.url().slice(0, 100)}`); });
+  await page.goto(own);
+  if (scripts) await settled(page);
+  return {page, troubles, close: () => context.close()};
+}
+
+/** Two frames later everything that was asked for is drawn. */
+export function settled(page) {
+  return page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(done)); }));
+}
+
+/**
+ * What the 3-D view shows: how many pixels are not empty, how many colours there are, how many pixels are near the page's
+ * own colours, and a sum that is another one where the picture is.
+ */
+export function picture(page) {
+  return page.evaluate(() => {
+    const canvas = document.querySelector('.stage canvas');
+    const gl = canvas.getContext('webgl2');
+    const {drawingBufferWidth: width, drawingBufferHeight: height} = gl;
+    const pixels = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    // Which of three primaries rules tells the page's colours apart in every scheme.
+    const near = {before: 0, after: 0, beam: 0};
+    let filled = 0;
+    let sum = 0;
+    const colours = new Set();
+    for (let k = 0; k < pixels.length; k += 4) {
+      const [r, g, b, a] = pixels.subarray(k, k + 4);
+      if (a === 0) continue;
+      ++filled;
+      colours.add((r >> 3) << 10 | (g >> 3) << 5 | b >> 3);
+      sum = (sum * 31 + r + 256 * g + 65536 * b + k) % 1000000007;
+      if (a < 200) continue;
+      if (r > g + 40 && g > b + 30) ++near.before;  // orange
+      if (b > r + 60 && g > r + 20 && b > g + 20) ++near.after;  // blue, not the violet of an axis
+      if (g > r + 30 && g > b + 20) ++near.beam;  // green
+    }
+    return {width, height, filled, colours: colours.size, near, sum};
+  });
+}
+
+/** Pixels of a plot that uplot drew on. */
+export function inked(page, selector) {
+  return page.evaluate((at) => {
+    const canvas = document.querySelector(`${at} canvas`);
+    const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let k = 3; k < data.length; k += 4) count += data[k] > 0;
+    return count;
+  }, selector);
+}

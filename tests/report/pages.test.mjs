@@ -1,0 +1,375 @@
+/**
+ * Pages of identify, validate, plan, diagnose and report as a browser shows them: on a phone and on a desk, light, dark and
+ * on paper, without scripts, without WebGL.
+ */
+import assert from 'node:assert/strict';
+import {execFileSync} from 'node:child_process';
+import {readFileSync, statSync, writeFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+
+import {chain, measuredPoint, toolFrame} from '../../host/report/web/src/chain.js';
+import {jointsOf, norm, readData} from '../../host/report/web/src/data.js';
+import {inked, launch, open, picture, settled} from './browser.mjs';
+
+const source = process.env.FLEXCOMP_SOURCE_DIR;
+const folder = process.env.FLEXCOMP_PAGES;
+const robot = join(source, 'host/robots/tx60l.yaml');
+const truth = join(source, 'tests/data/tx60l_table1.yaml');
+const at = (name) => join(folder, name);
+const largestPage = 1500000;
+
+/** Exit status 5 is a result too: what stands on the page then is what this is about. */
+function flexcomp(...args) {
+  try {
+    return execFileSync(join(process.env.FLEXCOMP_BIN_DIR, 'flexcomp'), args, {cwd: folder, stdio: 'pipe', encoding: 'utf8'});
+  } catch (error) {
+    if (error.status === 5) return error.stdout;
+    throw new Error(`flexcomp ${args.join(' ')}: ${error.stderr}`);
+  }
+}
+const simulate = (file, ...more) => flexcomp('simulate', '--robot', robot, '--quiet', ...more, '-o', file);
+const context = ['--context', '--payloads', '0,1.108', '--noise', 'N1'];
+
+/** A table by its columns. */
+function csv(file) {
+  const [head, ...rows] = readFileSync(at(file), 'utf8').trim().split('\n').map((line) => line.split(','));
+  return Object.fromEntries(head.map((name, k) => [name, rows.map((row) => Number(row[k]))]));
+}
+function dataOf(name) {
+  const [, text] = readFileSync(at(name), 'utf8').match(/<script type="application\/json" id="data">(.*?)<\/script>/s);
+  return readData(text);
+}
+
+const pages = {
+  identify: 'identify.html', validate: 'validate.html', plan: 'plan.html', diagnose: 'diagnose.html', report: 'report.html',
+};
+let browser;
+
+before(async () => {
+  simulate('fitted.csv', '--truth', truth, '--poses', '60', '--seed', '3', ...context);
+  simulate('others.csv', '--truth', truth, '--poses', '30', '--seed', '33', ...context);
+  writeFileSync(at('hidden.yaml'), `${readFileSync(truth, 'utf8')}
+  - {effect: gear_harmonic, joint: 3, order: 2, sin_rad: 3.0e-4, cos_rad: 1.0e-4}\n`);
+  simulate('hidden.csv', '--truth', 'hidden.yaml', '--poses', '100', '--seed', '3', ...context);
+  simulate('kept.csv', '--truth', 'hidden.yaml', '--poses', '60', '--seed', '4', ...context);
+  flexcomp('identify', '--robot', robot, '--data', 'fitted.csv', '-o', 'cal.yaml', '--report', pages.identify);
+  flexcomp('validate', '--robot', robot, '--calibration', 'cal.yaml', '--data', 'others.csv', '--report', pages.validate,
+    '--json', 'validated.json');
+  flexcomp('plan', '--robot', robot, '--cell', join(source, 'docs/examples/cell.yaml'), '--poses', '14', '--payloads',
+    '0,1.108', '--effort', '0.1', '-o', 'plan.csv', '--report', pages.plan);
+  flexcomp('diagnose', '--robot', robot, '--data', 'hidden.csv', '--holdout', 'kept.csv', '-o', 'found.yaml', '--report',
+    pages.diagnose);
+  // The files of where an arm went: here the joints of the data with made-up errors, a row's own number among them.
+  const {q1_deg: q1, ...rest} = csv('others.csv');
+  const row = (k, size) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k]), size, 0, -size / (k + 1)].join(',');
+  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm';
+  for (const [name, size] of [['went_before.csv', 1], ['went_after.csv', 0.1]]) {
+    writeFileSync(at(name), `${[head, ...q1.map((_, k) => row(k, size))].join('\n')}\n`);
+  }
+  flexcomp('report', '--robot', robot, '--calibration', 'cal.yaml', '--errors', 'There=went_before.csv,went_after.csv',
+    '--errors', 'Back=went_after.csv,went_after.csv', '--result', 'Others=validated.json', '--title', '</script><b>title',
+    '--summary', 'A summary', '-o', pages.report);
+  browser = await launch();
+});
+after(() => browser?.close());
+
+test('the arm is drawn where the forward model has it', () => {
+  writeFileSync(at('one.csv'), 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm\n0,0,0,0,0,0,1,0,0\n');
+  const names = ['abb-irb120', 'kuka-kr6-r900', 'rx160l', 'tx60l', 'ur10', 'ur5'];
+  for (const name of names) {
+    const file = join(source, `host/robots/${name}.yaml`);
+    // Inside the limits of all of them.
+    writeFileSync(at('joints.csv'), ['q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg', '10,20,-30,40,50,60', '-80,-35,25,-70,-20,100',
+      '0,0,0,0,0,0'].join('\n'));
+    flexcomp('predict', '--robot', file, '--joints', 'joints.csv', '-o', 'there.csv', '--force');
+    flexcomp('report', '--robot', file, '--errors', 'One=one.csv,one.csv', '-o', 'arm.html');
+    const {arm} = dataOf('arm.html');
+    const there = csv('there.csv');
+    for (let k = 0; k < 3; ++k) {
+      const q = [1, 2, 3, 4, 5, 6].map((j) => (csv('joints.csv')[`q${j}_deg`][k] * Math.PI) / 180);
+      const p = measuredPoint(arm, q);
+      ['x_mm', 'y_mm', 'z_mm'].forEach((key, i) => assert.ok(Math.abs(p[i] * 1e3 - there[key][k]) < 1e-3,
+        `${name}, pose ${k + 1}: ${p[i] * 1e3} and ${there[key][k]}`));
+      // The tool's z axis against the predicted quaternion: a wrong rotation may leave the point alone.
+      const [w, x, y, z] = ['qw', 'qx', 'qy', 'qz'].map((key) => there[key][k]);
+      const axis = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)];
+      const drawn = toolFrame(arm, chain(arm, q)[6]).z;
+      axis.forEach((v, i) => assert.ok(Math.abs(v - drawn[i]) < 1e-6, `${name}, pose ${k + 1}: ${drawn} and ${axis}`));
+    }
+  }
+});
+
+test('the numbers of the page are those of the data', () => {
+  const {sets: [set]} = dataOf(pages.identify);
+  const data = csv('fitted.csv');
+  assert.equal(set.count, 60);
+  for (let k = 0; k < 60; ++k) {
+    for (let j = 0; j < 6; ++j) assert.ok(Math.abs((jointsOf(set, k)[j] * 180) / Math.PI - data[`q${j + 1}_deg`][k]) < 6e-4);
+    assert.equal(set.line[k], k + 2);
+  }
+  const covariate = (start) => set.covariates.find((c) => c.name.startsWith(start)).values;
+  for (const [name, column] of [['payload', 'payload_kg'], ['temperature', 'temp_c'], ['time', 'time_s']]) {
+    covariate(name).forEach((v, k) => assert.ok(Math.abs(v - data[column][k]) <= 1e-3 * Math.max(...data[column].map(Math.abs)),
+      `${name} ${v} ${data[column][k]}`));
+  }
+  // Before: the nominal arm's error, as validate counts it of the same rows.
+  flexcomp('validate', '--robot', robot, '--calibration', 'cal.yaml', '--data', 'fitted.csv', '--json', 'same.json');
+  const same = JSON.parse(readFileSync(at('same.json'), 'utf8'));
+  const mean = (which) => Array.from({length: 60}, (_, k) => norm(set.error(which, k))).reduce((a, b) => a + b) / 60;
+  assert.ok(Math.abs(mean('before') - same.before.nominal_frames.mean_mm) < 1e-4);
+  assert.ok(Math.abs(mean('after') - same.after.mean_mm) < 1e-4);
+});
+
+test('errors are drawn in the frame of the arm, wherever the instrument stands', () => {
+  // The same arm without noise, measured from two places, by a model that leaves much of the error: what is left is the
+  // same vector of the arm.
+  const left = ['0,0,0,0,0,0', '-2100,340,55,20,-35,130'].map((frame, n) => {
+    simulate(`place${n}.csv`, '--truth', truth, '--poses', '40', '--seed', '9', '--noise', 'none', '--frame', frame);
+    flexcomp('identify', '--robot', robot, '--data', `place${n}.csv`, '--model', 'geometric', '--frames', 'fit', '--plain', '-o',
+      `place${n}.yaml`, '--report', `place${n}.html`);
+    return dataOf(`place${n}.html`).sets[0];
+  });
+  for (let k = 0; k < 40; ++k) {
+    const [a, b] = left.map((set) => set.errorInBase('after', k));
+    assert.ok(norm(a) > 0.01);
+    a.forEach((v, i) => assert.ok(Math.abs(v - b[i]) < 0.02 * norm(a) + 2e-3, `pose ${k + 1}: ${a} and ${b}`));
+  }
+});
+
+const said = {
+  identify: ['Parameters', 'Cannot be told apart', 'Which model?', 'geometry alone', 'without link gravity', 'base.z_mm'],
+  validate: ['Poses that were not fitted', 'Parameters'],
+  plan: ['The plan', 'What to expect'],
+  diagnose: ['How the gap shrinks', 'Where', 'What was found', 'gear_harmonic[joint=3,order=2]', 'comes twice per turn'],
+  report: ['A summary', 'There', 'Back', 'Other data', '</script><b>title'],
+};
+for (const [command, file] of Object.entries(pages)) {
+  test(`${command}: one file, small, and whole on a phone and on a desk, light and dark`, async () => {
+    assert.ok(statSync(at(file)).size <= largestPage, `${statSync(at(file)).size} bytes`);
+    const all = [[390, 'dark'], [1280, 'light'], ...(command === 'identify' ? [[390, 'light'], [1280, 'dark']] : [])];
+    for (const [width, scheme] of all) {
+      const {page, troubles, close} = await open(browser, at(file), {width, scheme});
+      const where = `${command}, ${width} px, ${scheme}`;
+      const size = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+      assert.ok(size[0] <= size[1], `${where}: ${size[0]} px wide`);
+      const seen = await picture(page);
+      assert.ok(seen.filled > 2000 && seen.colours > 20, `${where}: the arm is not to be seen: ${JSON.stringify(seen)}`);
+      if (command !== 'plan') {
+        assert.ok(seen.near.before > 30, `${where}: no errors: ${JSON.stringify(seen)}`);
+        for (const plot of ['.scatter', '.histogram']) assert.ok(await inked(page, plot) > 2000, `${where}: ${plot} is empty`);
+      }
+      const paper = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+      const [light] = paper.match(/\d+/g).map(Number);
+      assert.ok(scheme === 'dark' ? light < 60 : light > 200, `${where}: ${paper}`);
+      const text = await page.innerText('main');
+      for (const word of said[command]) assert.ok(text.includes(word), `${where}: no "${word}"`);
+      assert.deepEqual(troubles, [], where);
+      await page.screenshot({path: at(`${command}_${width}_${scheme}.png`), fullPage: true});
+      await close();
+    }
+  });
+}
+
+test('before, after, and how long they are drawn', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify));
+  const words = () => page.textContent('.scale');
+  const times = async () => Number((await words()).match(/drawn ([\d,]+) times/)[1].replaceAll(',', ''));
+  const chooseErrors = async (which) => {
+    await page.check(`.view3d .choice input[value=${which}]`, {force: true});
+    await settled(page);
+    return picture(page);
+  };
+  const first = await times();
+  const both = await picture(page);
+  const onlyAfter = await chooseErrors('after');
+  assert.ok(onlyAfter.near.before < both.near.before / 20, 'the errors before are still there');
+  assert.ok(onlyAfter.near.after > 200, JSON.stringify(onlyAfter));
+  assert.ok(await times() > first, 'the small errors after are drawn longer');
+  const onlyBefore = await chooseErrors('before');
+  assert.equal(await times(), first);
+  assert.ok(onlyBefore.near.before > 500);
+  await page.locator('.view3d .length').fill('0');
+  await settled(page);
+  assert.ok(await times() < first);
+  assert.ok((await picture(page)).near.before < onlyBefore.near.before / 3, 'shorter arrows cover less');
+  // One square of the grid in mm of error follows from the two numbers beside it.
+  const [, square, error] = (await words()).match(/grid: ([\d.]+) mm of the arm, ([\d.]+) mm of error/);
+  assert.ok(Math.abs(Number(square) / await times() / Number(error) - 1) < 0.01, await words());
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('the view turns, comes nearer, and goes to a pose', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify));
+  const seen = [(await picture(page)).sum];
+  const change = async (what, action) => {
+    await action();
+    await settled(page);
+    await page.waitForTimeout(50);
+    seen.push((await picture(page)).sum);
+    assert.equal(new Set(seen).size, seen.length, `${what} changes nothing`);
+  };
+  const box = await page.locator('.stage').boundingBox();
+  await change('dragging', async () => {
+    await page.mouse.move(box.x + 300, box.y + 200);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 420, box.y + 240, {steps: 4});
+    await page.mouse.up();
+  });
+  await change('nearer', () => page.click('button[aria-label=nearer]'));
+  await change('from above', () => page.getByRole('button', {name: 'above'}).click());
+  await change('the next pose', () => page.click('button[aria-label="the next pose"]'));
+  assert.match(await page.textContent('.view3d .readout'), /^Pose 2 of 60 \(line 3\)/);
+  await change('without bodies', () => page.getByLabel('bodies (capsules)').uncheck());
+  // The wheel belongs to the page until the view was clicked; then it brings the arm nearer.
+  await page.evaluate(() => document.activeElement.blur());
+  await page.mouse.move(box.x + 300, box.y + 200);
+  const scrolled = () => page.evaluate(() => scrollY);
+  const start = await scrolled();
+  await page.mouse.wheel(0, 100);
+  await page.waitForFunction((y) => scrollY > y, start);
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('errors against everything that was recorded, and a dot that is clicked', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify));
+  const against = page.locator('.explore select').nth(1);
+  const names = await against.locator('option').allTextContents();
+  for (const wanted of ['q1 [deg]', 'q2 [deg]', 'q3 [deg]', 'q4 [deg]', 'q5 [deg]', 'q6 [deg]', 'payload [kg]',
+    'temperature [°C]', 'time [s]', 'order of the data']) assert.ok(names.includes(wanted), `${wanted} of ${names}`);
+  for (const kind of ['size', 'x', 'turned']) {
+    await page.locator('.explore select').first().selectOption(kind);
+    for (let k = 0; k < names.length; ++k) {
+      await against.selectOption(String(k));
+      await settled(page);
+      assert.ok(await inked(page, '.scatter') > 1500, `${kind} against ${names[k]}`);
+    }
+    assert.ok(await inked(page, '.histogram') > 1500);
+  }
+  // Every dot says its pose; clicked, the arm goes there.
+  await page.locator('.explore select').first().selectOption('size');
+  await against.selectOption({label: 'order of the data'});
+  await settled(page);
+  const inSight = async () => {
+    await page.waitForTimeout(400);  // the page may still be scrolling to the arm
+    await page.locator('.scatter').scrollIntoViewIfNeeded();
+    return page.locator('.scatter .u-over').boundingBox();
+  };
+  let plot = await inSight();
+  let clicked = 0;
+  for (let share = 0.1; share < 1 && clicked < 3; share += 0.13) {
+    for (let down = 0.02; down < 1; down += 0.08) {
+      await page.mouse.move(plot.x + share * plot.width, plot.y + down * plot.height);
+      const said = await page.textContent('.explore .readout');
+      const pose = said.match(/^Pose (\d+) \(line (\d+)\): order of the data (\d+)/);
+      if (!pose) continue;
+      assert.equal(pose[1], String(Number(pose[2]) - 1));
+      assert.equal(pose[1], pose[3].replace(/\.0*$/, ''));
+      await page.mouse.down();
+      await page.mouse.up();
+      assert.match(await page.textContent('.view3d .readout'), new RegExp(`^Pose ${pose[1]} of 60`));
+      ++clicked;
+      plot = await inSight();
+      break;
+    }
+  }
+  assert.ok(clicked >= 2, 'no dot was found');
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('the plan has beams, bodies and all its poses', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.plan));
+  const whole = await picture(page);
+  assert.ok(whole.near.beam > 300, JSON.stringify(whole));
+  assert.match(await page.textContent('.legend'), /planned poses.*beams from the instrument.*bodies/s);
+  assert.match(await page.textContent('.view3d .readout'), /^Pose 1 of 14, with [\d.]+ kg; q1/);
+  await page.getByLabel('bodies (capsules)').uncheck();
+  await settled(page);
+  const bare = await picture(page);
+  assert.ok(bare.filled < whole.filled * 0.9, 'bodies and floor cover more than the rest');
+  await page.getByLabel('all poses').uncheck();
+  await settled(page);
+  const one = await picture(page);
+  assert.ok(one.near.beam < bare.near.beam && one.near.beam > 50, 'the beams of one pose');
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('several sets: one is chosen, each has its own plots', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.report));
+  assert.equal(await page.locator('.explore .uplot').count(), 4);
+  const first = await picture(page);
+  await page.locator('.view3d select').selectOption({label: 'Back'});
+  await settled(page);
+  assert.notEqual((await picture(page)).sum, first.sum);
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('on paper: drawings for plots, no buttons, light in a dark room too', async () => {
+  const shown = (page, selector) => page.evaluate((s) =>
+    [...document.querySelectorAll(s)].filter((e) => e.getBoundingClientRect().height > 0).length, selector);
+  for (const [command, file] of Object.entries(pages)) {
+    const {page, troubles, close} = await open(browser, at(file), {width: 794, scheme: 'dark'});
+    assert.equal(await shown(page, '.still'), 0, 'on the screen the script draws');
+    await page.emulateMedia({media: 'print', colorScheme: 'dark'});
+    await settled(page);
+    assert.equal(await shown(page, '.explore, .controls'), 0);
+    if (command !== 'plan') assert.ok(await shown(page, '.still svg') >= 9, `${command}: drawings for paper`);
+    const width = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+    assert.ok(width[0] <= width[1], `${command}: ${width[0]} px wide on paper`);
+    const seen = await picture(page);
+    assert.ok(seen.filled > 2000);
+    const paper = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+    assert.equal(paper, 'rgb(255, 255, 255)');
+    assert.ok((await page.pdf({path: at(`${command}.pdf`), format: 'A4'})).length > 20000);
+    assert.deepEqual(troubles, []);
+    await close();
+  }
+});
+
+test('without scripts everything but the 3-D view is there', async () => {
+  for (const [command, file] of Object.entries(pages)) {
+    const {page, close} = await open(browser, at(file), {width: 390, scripts: false});
+    const main = page.locator('main');
+    assert.match(await main.innerText(), /The view of the arm in 3-D needs scripts/);
+    assert.ok(await page.locator('svg:visible').count() >= (command === 'plan' ? 2 : 9), command);
+    await page.screenshot({path: at(`${command}_no_scripts.png`), fullPage: true});
+    await close();
+  }
+});
+
+test('without WebGL a sentence stands there, and the plots work', async () => {
+  const blind = await launch({webgl: false});
+  try {
+    const {page, troubles, close} = await open(blind, at(pages.identify));
+    assert.match(await page.innerText('.view3d'), /draws no 3-D here/);
+    assert.equal(await page.locator('.stage').count(), 0);
+    assert.ok(await inked(page, '.scatter') > 2000);
+    const plot = await page.locator('.scatter .u-over').boundingBox();
+    await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
+    assert.deepEqual(troubles.filter((t) => !/WebGL/i.test(t)), []);
+    await close();
+  } finally {
+    await blind.close();
+  }
+});
+
+test('three thousand poses stay below the limit, and more do too', async () => {
+  for (const poses of [3000, 12000]) {
+    simulate('many.csv', '--truth', truth, '--poses', String(poses), '--seed', '5', ...context);
+    flexcomp('validate', '--robot', robot, '--calibration', 'cal.yaml', '--data', 'many.csv', '--report', 'many.html');
+    assert.ok(statSync(at('many.html')).size <= largestPage, `${statSync(at('many.html')).size} bytes`);
+    const {sets: [set]} = dataOf('many.html');
+    assert.equal(set.total, poses);
+    assert.ok(set.count === 3000 || (poses > 3000 && set.count >= 1000), `${set.count}`);
+    const {page, troubles, close} = await open(browser, at('many.html'), {width: 390});
+    assert.ok((await picture(page)).near.before > 300);
+    assert.equal(/of 12000 poses are drawn/.test(await page.innerText('main')), poses === 12000);
+    assert.deepEqual(troubles, []);
+    await close();
+  }
+});
