@@ -241,8 +241,8 @@ void Identify::run() const {
                      {"after", to_json(r.after)},
                      {"values", parameters}});
   if (!report.empty()) {
-    write_file(report, html(page_of(r, rows, robot_file, data,
-                                    compare_models(robot_file, rows, data, options))));
+    write_file(report,
+               html(page_of(r, rows, robot_file, data, compare_models(robot_file, rows, data, options))));
     common.say(report + ": written");
   }
   if (r.doubts.empty()) return;

@@ -143,7 +143,7 @@ void Report::run() const {
   if (!calibration.empty()) add_parameters(page, load_calibration(calibration, robot_file), robot_file);
   Calibration now;
   stamp(now, robot_file);
-  page.made_by = fmt::format("{}, {}", now.tool_version, now.date);
+  page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
   write_file(out, html(page));
   common.say(out + ": written");
 }

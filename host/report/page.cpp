@@ -166,7 +166,11 @@ std::vector<Covariate> covariates(const PagePoses& set) {
 }
 
 /// \param number  of this set, for the script; what it draws instead has the class still
-std::string poses_section(const PagePoses& set, std::size_t number) {
+/// \param sets    that share the page
+std::string poses_section(const PagePoses& set, std::size_t number, std::size_t sets) {
+  Detail detail;
+  for (std::size_t* most : {&detail.dots, &detail.dots_of_three, &detail.steps})
+    *most = std::max<std::size_t>(*most / sets, 40);
   std::string out = fmt::format("<section><h2>{}</h2>\n", escaped(set.title));
   if (!set.about.empty()) out += fmt::format("<p>{}</p>\n", escaped(set.about));
   if (set.poses.empty()) return out + "<p>No poses.</p></section>\n";
@@ -190,21 +194,23 @@ std::string poses_section(const PagePoses& set, std::size_t number) {
                     set.poses.size(), which, static_cast<std::size_t>(outliers) > named ? ", …" : "");
   }
   out += fmt::format("<div class=\"explore\" data-set=\"{}\"></div>\n<div class=\"plots wide\">\n", number);
-  out += still(figure(plot_in_order(position), "Position error of each pose, in the order of the data."));
-  out += figure(plot_sorted(position),
+  out += still(
+      figure(plot_in_order(position, detail), "Position error of each pose, in the order of the data."));
+  out += figure(plot_sorted(position, detail),
                 "Position error, sorted: the share of the poses whose error lies below a value.");
   out += still(figure(plot_histogram(position), "How many poses have which position error."));
   if (!orientation.before.empty()) {
-    out += figure(plot_sorted(orientation), "Orientation error, sorted.");
+    out += figure(plot_sorted(orientation, detail), "Orientation error, sorted.");
   }
   out +=
-      "</div>\n<div class=\"still\"><h3>What is left, against each joint and whatever else was recorded</h3>\n"
+      "</div>\n<div class=\"still\"><h3>What is left, against each joint and whatever else was "
+      "recorded</h3>\n"
       "<p>The three components of the position error after: "
       "<span class=\"mark x\"></span> x, <span class=\"mark y\"></span> y, <span class=\"mark z\"></span> z. "
       "Noise has no shape here; a curve or a slope is an effect that the model does not have. Poses far off "
       "the others are drawn at the edge.</p>\n<div class=\"plots\">\n";
   for (const Covariate& c : covariates(set)) {
-    out += figure(plot_against(set.poses, c.values, c.axis, c.words),
+    out += figure(plot_against(set.poses, c.values, c.axis, c.words, detail),
                   fmt::format("Against {}.", escaped(c.words)));
   }
   return out + "</div></div></section>\n";
@@ -282,13 +288,12 @@ std::string parameter_table(const Page& page) {
       ratio = times < 100 ? fmt::format("{:.1f}", times) : fmt::format("{:.0f}", times);
     }
     const auto also = carried.find(p.name);
-    out += fmt::format("<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>\n",
-                       pale ? " class=\"pale\"" : "", escaped(p.name), value, sigma, unit_of_name(p.name),
-                       ratio,
-                       carried.empty() ? ""
-                                       : fmt::format("<td>{}</td>", also == carried.end()
-                                                                        ? std::string()
-                                                                        : joined(also->second)));
+    out += fmt::format(
+        "<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>\n",
+        pale ? " class=\"pale\"" : "", escaped(p.name), value, sigma, unit_of_name(p.name), ratio,
+        carried.empty()
+            ? ""
+            : fmt::format("<td>{}</td>", also == carried.end() ? std::string() : joined(also->second)));
   }
   return out + "</tbody></table></div></section>\n";
 }
@@ -425,7 +430,8 @@ std::string html(const Page& page, bool web) {
   out += arm_section(page, web);
   if (page.plan) out += plan_section(*page.plan);
   for (const PageSection& section : page.sections) out += free_section(section);
-  for (std::size_t k = 0; k < page.poses.size(); ++k) out += poses_section(page.poses[k], k);
+  for (std::size_t k = 0; k < page.poses.size(); ++k)
+    out += poses_section(page.poses[k], k, page.poses.size());
   for (const PageSection& section : page.further) out += free_section(section);
   out += results_table(page);
   out += limits_of_the_data(page);

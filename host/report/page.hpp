@@ -114,8 +114,8 @@ struct Page {
   std::vector<PageConfounded> confounded;
   std::vector<std::string> missing;  ///< parameters that these data do not know though such data could
   std::vector<std::array<double, joint_count>> cure_rad;  ///< poses that would make them known
-  std::vector<PageSection> sections;  ///< before the poses
-  std::vector<PageSection> further;   ///< after them
+  std::vector<PageSection> sections;                      ///< before the poses
+  std::vector<PageSection> further;                       ///< after them
   std::vector<PageResult> results;
   std::vector<PageLink> links;
   std::string made_by;  ///< "flexcomp 0.1.0, 2025-01-31"

@@ -18,10 +18,6 @@ constexpr double width = 360, height = 220;
 constexpr double left = 46, right = 12, top = 12, bottom = 36;
 // A logarithmic axis where one number is this many times another: else the smaller ones lie on the axis.
 constexpr double log_from_ratio = 8;
-// More dots than this cover each other on a drawing of this size, and fill the page.
-constexpr std::size_t most_dots = 1000;
-constexpr std::size_t most_dots_of_three = 700;
-constexpr std::size_t most_steps = 400;
 
 struct Tick {
   double value;
@@ -196,17 +192,16 @@ std::string fine_dots(std::vector<std::array<double, 2>> places) {
 std::vector<std::size_t> evenly(std::size_t count, std::size_t most) {
   std::vector<std::size_t> chosen;
   const std::size_t drawn = std::min(count, most);
-  for (std::size_t k = 0; k < drawn; ++k)
-    chosen.push_back(drawn < 2 ? k : k * (count - 1) / (drawn - 1));
+  for (std::size_t k = 0; k < drawn; ++k) chosen.push_back(drawn < 2 ? k : k * (count - 1) / (drawn - 1));
   return chosen;
 }
 
-std::string step_line(std::vector<double> values, const Scale& scale) {
+std::string step_line(std::vector<double> values, const Scale& scale, std::size_t most) {
   std::sort(values.begin(), values.end());
   std::string d;
   const auto n = static_cast<double>(values.size());
   double from = 0;
-  for (const std::size_t k : evenly(values.size(), most_steps)) {
+  for (const std::size_t k : evenly(values.size(), most)) {
     const double x = px(scale.at(values[k]));
     const double to = static_cast<double>(k + 1) / n;
     d += fmt::format("{}{:.1f} {:.1f}V{:.1f}", d.empty() ? "M" : "L", x, py(from), py(to));
@@ -278,8 +273,8 @@ std::string plot_curves(const Curves& c) {
     const Curve& curve = c.curves[k];
     const std::string kind = curve.colour.empty() ? kinds[k] : curve.colour;
     std::string line, dots, forth, back;
-    for (const std::size_t n : evenly(
-             curve.points.size(), curve.style == CurveStyle::dots ? most_dots : curve.points.size())) {
+    for (const std::size_t n :
+         evenly(curve.points.size(), curve.style == CurveStyle::dots ? Detail().dots : curve.points.size())) {
       const auto& [at, value] = curve.points[n];
       if (c.log_y && !(value > 0)) continue;
       const double px_at = px(x.at(at));
@@ -338,7 +333,7 @@ std::string plot_bars(const Bars& bars) {
   return plot.done();
 }
 
-std::string plot_in_order(const ErrorPairs& errors) {
+std::string plot_in_order(const ErrorPairs& errors, const Detail& detail) {
   const Scale y = scale_of(errors);
   const auto n = static_cast<double>(errors.before.size());
   const Scale x{0.5 - 0.02 * n, n + 0.5 + 0.02 * n, false};
@@ -350,7 +345,7 @@ std::string plot_in_order(const ErrorPairs& errors) {
   }
   plot.x_axis(ticks, x, "pose");
   std::string stems, before, after;
-  for (const std::size_t k : evenly(errors.before.size(), most_dots)) {
+  for (const std::size_t k : evenly(errors.before.size(), detail.dots)) {
     const double at = px(x.at(static_cast<double>(k + 1)));
     const double upper = py(y.at(errors.before[k])), lower = py(y.at(errors.after[k]));
     if (errors.before.size() <= 120) stems += fmt::format("M{:.1f} {:.1f}V{:.1f}", at, upper, lower);
@@ -365,7 +360,7 @@ std::string plot_in_order(const ErrorPairs& errors) {
   return plot.done();
 }
 
-std::string plot_sorted(const ErrorPairs& errors) {
+std::string plot_sorted(const ErrorPairs& errors, const Detail& detail) {
   const Scale x = scale_of(errors);
   const Scale y{0, 100, false};
   Plot plot("Share of the poses whose error lies below a value, before and after");
@@ -376,8 +371,8 @@ std::string plot_sorted(const ErrorPairs& errors) {
     plot.line(at, py(0), at, py(1), "floor");
     plot.text(at + 3, py(0.06), "start", "noise");
   }
-  plot.path(step_line(errors.before, x), "line before");
-  plot.path(step_line(errors.after, x), "line after");
+  plot.path(step_line(errors.before, x, detail.steps), "line before");
+  plot.path(step_line(errors.after, x, detail.steps), "line after");
   return plot.done();
 }
 
@@ -411,7 +406,7 @@ std::string plot_histogram(const ErrorPairs& errors) {
 }
 
 std::string plot_against(const std::vector<PagePose>& poses, const std::vector<double>& values,
-                         const std::string& axis, const std::string& described) {
+                         const std::string& axis, const std::string& described, const Detail& detail) {
   double reach = 0, low = HUGE_VAL, high = -HUGE_VAL;
   std::vector<double> sizes;
   for (std::size_t n = 0; n < poses.size(); ++n) {
@@ -435,14 +430,15 @@ std::string plot_against(const std::vector<PagePose>& poses, const std::vector<d
   plot.x_axis(x.ticks(6), x, axis);
   static constexpr std::array<const char*, 3> kind{"dots x", "dots y", "dots z"};
   static constexpr std::array<const char*, 3> fine{"fine x", "fine y", "fine z"};
-  const std::vector<std::size_t> shown = shown_poses(poses, most_dots_of_three);
+  const std::vector<std::size_t> shown = shown_poses(poses, detail.dots_of_three);
   for (std::size_t k = 0; k < 3; ++k) {
     std::string d;
     std::vector<std::array<double, 2>> places;
     for (const std::size_t n : shown)
       places.push_back({px(x.at(values[n])), py(std::clamp(y.at(poses[n].after_m[k] * 1e3), 0.0, 1.0))});
     for (const auto& place : places) d += dot(place[0], place[1]);
-    poses.size() > 60 ? plot.path(places.size() > 200 ? fine_dots(places) : d, fine[k]) : plot.path(d, kind[k]);
+    poses.size() > 60 ? plot.path(places.size() > 200 ? fine_dots(places) : d, fine[k])
+                      : plot.path(d, kind[k]);
   }
   return plot.done();
 }

@@ -5,6 +5,7 @@
 #define FLEXCOMP_HOST_REPORT_PLOTS_HPP
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +14,13 @@
 #include "report/page.hpp"
 
 namespace flexcomp::host {
+
+/// How much is drawn of very many poses: more dots than these cover each other on a drawing of this size, and fill the page.
+struct Detail {
+  std::size_t dots = 1000;
+  std::size_t dots_of_three = 700;  ///< where each pose has three
+  std::size_t steps = 400;          ///< of a sorted line
+};
 
 /// Errors before and after over the same poses, in the unit in which they are shown.
 struct ErrorPairs {
@@ -52,9 +60,9 @@ struct Curves {
 std::string plot_curves(const Curves& curves);
 
 /// Each pose in the order of the data, before above after.
-std::string plot_in_order(const ErrorPairs& errors);
+std::string plot_in_order(const ErrorPairs& errors, const Detail& detail = {});
 /// Which share of the poses lies below which error.
-std::string plot_sorted(const ErrorPairs& errors);
+std::string plot_sorted(const ErrorPairs& errors, const Detail& detail = {});
 /// How many poses lie in which class of errors.
 std::string plot_histogram(const ErrorPairs& errors);
 /// The three components of the position error that is left, against something known at every pose: what has a shape is not
@@ -63,7 +71,7 @@ std::string plot_histogram(const ErrorPairs& errors);
 /// \param axis       "q1 [deg]"
 /// \param described  what they are, for those who do not see it: "the angle of joint 1"
 std::string plot_against(const std::vector<PagePose>& poses, const std::vector<double>& values,
-                         const std::string& axis, const std::string& described);
+                         const std::string& axis, const std::string& described, const Detail& detail = {});
 
 /// Named amounts of 0 or more as bars, one above the other, before and after.
 struct Bars {

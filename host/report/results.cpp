@@ -103,22 +103,23 @@ PageSection models_section(const std::vector<ModelFit>& compared) {
       "The models of the paper, each fitted anew to these rows. What a model gains on the rows that it is "
       "fitted to may be noise that it has learnt; what it gains on rows left out is the arm. Left out: each "
       "row in turn, predicted by a fit to all the others."};
-  section.columns = {"model", "parameters", "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
-                     "largest [mm]", "chi-square per dof"};
+  section.columns = {
+      "model",        "parameters",        "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
+      "largest [mm]", "chi-square per dof"};
   const auto mm = [](double metres) { return fmt::format("{:.4f}", metres * 1e3); };
-  Curves curves{"Position error of the left-out rows over the share of rows that are further off, for each model",
-                "% of the rows that are further off",
-                "position error, left out [mm]",
-                {},
-                true,
-                {}};
+  Curves curves{
+      "Position error of the left-out rows over the share of rows that are further off, for each model",
+      "% of the rows that are further off",
+      "position error, left out [mm]",
+      {},
+      true,
+      {}};
   static constexpr std::array<const char*, 4> colours{"after", "y", "z", "before"};
   bool partly = false;
   for (const ModelFit& m : compared) {
     section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm(m.fitted.mean_m),
                             mm(m.fitted.max_m), m.left_out ? mm(m.left_out->mean_m) : "–",
-                            m.left_out ? mm(m.left_out->max_m) : "–",
-                            fmt::format("{:.3g}", m.chi2_per_dof)});
+                            m.left_out ? mm(m.left_out->max_m) : "–", fmt::format("{:.3g}", m.chi2_per_dof)});
     partly = partly || !m.left_out;
     if (!m.left_out) continue;
     Curve curve{model_words(m.kind), {}, CurveStyle::line, colours[static_cast<std::size_t>(m.kind)], {}};

@@ -26,7 +26,7 @@ p { margin: .4rem 0; max-width: 46rem; }
 .lead { font-size: 1.1rem; }
 .headline { font-size: 1.7rem; font-weight: 600; font-variant-numeric: tabular-nums; max-width: none; }
 .headline small { font-size: .95rem; font-weight: 400; color: var(--soft); }
-.headline .before { color: var(--before); } .headline .after { color: var(--after); }
+.headline .before { color: var(--before); } .headline .after { color: var(--after); } .headline span { white-space: nowrap; }
 .doubts { background: var(--warn); border-left: 4px solid var(--warn-edge); padding: .2rem 1rem; margin: 1rem 0; }
 .doubts h2 { border: 0; margin: .4rem 0; padding: 0; }
 .facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: .5rem; margin: 1rem 0; }

@@ -26,7 +26,9 @@ double short_number(double v, int digits = 6) {
   return std::round(v * power) / power;
 }
 
-Json numbers(const Eigen::Vector3d& v) { return {short_number(v[0]), short_number(v[1]), short_number(v[2])}; }
+Json numbers(const Eigen::Vector3d& v) {
+  return {short_number(v[0]), short_number(v[1]), short_number(v[2])};
+}
 
 std::int64_t counted(double value, double unit) {
   return std::isfinite(value) ? static_cast<std::int64_t>(std::llround(std::clamp(value / unit, -1e15, 1e15)))
@@ -67,7 +69,8 @@ Json arm_json(const RobotFile& robot) {
 
 Json set_json(const PagePoses& set, std::size_t limit) {
   const std::vector<std::size_t> rows = shown_poses(set.poses, limit);
-  Json j{{"title", set.title}, {"before_is", set.before}, {"after_is", set.after}, {"total", set.poses.size()}};
+  Json j{
+      {"title", set.title}, {"before_is", set.before}, {"after_is", set.after}, {"total", set.poses.size()}};
   Json number = Json::array(), line = Json::array(), outlier = Json::array(), q = Json::array(),
        before = Json::array(), after = Json::array(), turned_before = Json::array(),
        turned_after = Json::array();
@@ -92,7 +95,8 @@ Json set_json(const PagePoses& set, std::size_t limit) {
   if (rows.size() < set.poses.size()) j["number"] = number;
   // A file without gaps is its first line and a count.
   bool gapless = lines;
-  for (const std::size_t k : rows) gapless = gapless && set.poses[k].line == set.poses[rows[0]].line + k - rows[0];
+  for (const std::size_t k : rows)
+    gapless = gapless && set.poses[k].line == set.poses[rows[0]].line + k - rows[0];
   if (gapless && !rows.empty()) {
     j["first_line"] = set.poses[rows[0]].line - rows[0];
   } else if (lines) {

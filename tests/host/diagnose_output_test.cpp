@@ -424,7 +424,7 @@ TEST(DiagnosisPage, ShowsEverythingThatWasAsked) {
   d.notes = {"<b>a note & more"};
   d.telling_poses = {{{0.1, 0.2, 0.3, 0.4, 0.5, 0.6}, 1.108}};
   const HeldOut others = held_out(hidden.robot, d, hidden.rows(40, 5), "h.csv", false);
-  const std::string page = html(page_of(d, rows, hidden.robot, "d.csv", others));
+  const std::string page = html(page_of(d, rows, hidden.robot, "d.csv", others), false);
   if (const char* keep = std::getenv("FLEXCOMP_KEEP_PAGE")) std::ofstream(keep) << page;
   for (const char* wanted : {"One effect was missing and has a name", "How the gap shrinks", "held-out rows",
                              "link3.theta", "gear_harmonic[joint=3,order=2]", "amplitude", "thermal_growth",
@@ -445,12 +445,12 @@ TEST(DiagnosisPage, ShowsEverythingThatWasAsked) {
   Diagnosis u = unnamed.diagnosis(rows);
   u.effects.clear();
   u.verdict = Verdict::unnamed;
-  const std::string other = html(page_of(u, rows, unnamed.robot, "d.csv", std::nullopt));
+  const std::string other = html(page_of(u, rows, unnamed.robot, "d.csv", std::nullopt), false);
   EXPECT_THAT(other, HasSubstr("no effect of the catalogue explains"));
   EXPECT_THAT(other, HasSubstr("payload_kg = 1.108"));
 
   // Nothing found, nothing known: the page of a placeholder still stands.
-  const std::string empty = html(page_of(Diagnosis(), {}, hidden.robot, "d.csv", std::nullopt));
+  const std::string empty = html(page_of(Diagnosis(), {}, hidden.robot, "d.csv", std::nullopt), false);
   EXPECT_THAT(empty, HasSubstr("Nothing is missing"));
   EXPECT_THAT(empty, Not(HasSubstr("nan")));
 }

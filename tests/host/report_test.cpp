@@ -2,13 +2,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "report/page.hpp"
 #include "report/plots.hpp"
+#include "report/shown_poses.hpp"
+#include "report/web_bundle.hpp"
+#include "report/web_data.hpp"
+#include "units.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -76,17 +84,154 @@ std::string unbalanced(const std::string& text) {
   return open.empty() ? "" : open.back() + " stays open";
 }
 
+/// The page without what stands in its script elements, of which there must be these many.
+std::string without_scripts(std::string page, std::size_t scripts) {
+  std::size_t found = 0;
+  for (std::size_t at = page.find("<script"); at != std::string::npos; at = page.find("<script", at)) {
+    const std::size_t end = page.find("</script>", at);
+    if (end == std::string::npos) return "a script stays open";
+    page.erase(at, end + 9 - at);
+    ++found;
+  }
+  EXPECT_EQ(found, scripts);
+  return page;
+}
+
 TEST(Report, IsWellFormedAndSelfContained) {
   for (const std::size_t count : {1U, 2U, 30U, 300U}) {
-    const std::string page = html(example(count));
-    EXPECT_EQ(unbalanced(page), "") << count << " poses";
-    EXPECT_EQ(occurrences(page, "<svg "), 10U);
-    for (const char* never : {"<script", "<link", "<img", "src=", "url(", "@import", "nan", "inf ", "-inf"}) {
-      EXPECT_THAT(page, Not(HasSubstr(never))) << count << " poses";
+    for (const bool web : {false, true}) {
+      const bool scripted = web && has_web_parts();
+      const std::string page = without_scripts(html(example(count), web), scripted ? 2 : 0);
+      EXPECT_EQ(unbalanced(page), "") << count << " poses";
+      EXPECT_EQ(occurrences(page, "<svg "), 11U);
+      for (const char* never :
+           {"<script", "<link", "<img", "src=", "url(", "@import", "nan", "inf ", "-inf", "https:"}) {
+        EXPECT_THAT(page, Not(HasSubstr(never))) << count << " poses";
+      }
+      // The only address is the name of the SVG language, which nobody fetches; and nothing may be fetched at all.
+      EXPECT_EQ(occurrences(page, "http:"), occurrences(page, "http://www.w3.org/2000/svg"));
+      EXPECT_THAT(page, HasSubstr("default-src 'none'"));
     }
-    // The only address is the name of the SVG language, which nobody fetches.
-    EXPECT_EQ(occurrences(page, "http"), occurrences(page, "http://www.w3.org/2000/svg"));
   }
+}
+
+TEST(Report, TheScriptFitsIntoAPage) {
+  if (!has_web_parts()) GTEST_SKIP() << "built with FLEXCOMP_REPORT_WEB=OFF";
+  for (const char* never : {"</script", "<!--", "https://"})
+    EXPECT_EQ(web_script().find(never), std::string_view::npos) << never;
+  for (const char* never : {"</style", "url(", "@import"})
+    EXPECT_EQ(web_style().find(never), std::string_view::npos) << never;
+  // Passed on with their licences.
+  for (const char* wanted : {"three", "uplot", "Permission is hereby granted"})
+    EXPECT_NE(web_script().substr(0, 5000).find(wanted), std::string_view::npos) << wanted;
+  EXPECT_LT(web_script().size(), 800000U);
+}
+
+TEST(Report, ShownPosesAreTheLargestAndAnEvenPartOfTheRest) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> size(0, 1e-3);
+  for (const std::size_t count : {0U, 1U, 99U, 100U, 101U, 5000U}) {
+    std::vector<PagePose> poses(count);
+    for (PagePose& p : poses) p.after_m = {size(random), -size(random), size(random)};
+    const std::vector<std::size_t> shown = shown_poses(poses, 100);
+    EXPECT_EQ(shown.size(), std::min<std::size_t>(count, 100));
+    EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end()));
+    EXPECT_EQ(std::adjacent_find(shown.begin(), shown.end()), shown.end()) << "none twice";
+    std::vector<std::size_t> by_size(count);
+    for (std::size_t k = 0; k < count; ++k) by_size[k] = k;
+    const auto length = [&](std::size_t k) {
+      return std::hypot(poses[k].after_m[0], poses[k].after_m[1], poses[k].after_m[2]);
+    };
+    std::sort(by_size.begin(), by_size.end(),
+              [&](std::size_t a, std::size_t b) { return length(a) > length(b); });
+    for (std::size_t k = 0; k < std::min<std::size_t>(count, 5); ++k)
+      EXPECT_TRUE(std::binary_search(shown.begin(), shown.end(), by_size[k])) << k;
+    if (count < 5000) continue;
+    // Every tenth of the data has its part.
+    for (std::size_t from = 0; from < count; from += count / 10) {
+      const auto low = std::lower_bound(shown.begin(), shown.end(), from);
+      const auto high = std::lower_bound(shown.begin(), shown.end(), from + count / 10);
+      EXPECT_GE(high - low, 7) << from;
+    }
+  }
+}
+
+TEST(Report, StaysBelowItsSizeWhateverIsPutIn) {
+  for (const bool web : {false, true}) {
+    for (const std::size_t sets : {1U, 4U, 12U}) {
+      Page page = example(12000);
+      PagePoses& set = page.poses[0];
+      for (int k = 0; k < 15; ++k) {
+        PageCovariate c{"covariate " + std::to_string(k), {}};
+        for (std::size_t n = 0; n < set.poses.size(); ++n)
+          c.values.push_back(std::sin(static_cast<double>(n)) * 123.456789);
+        c.on_paper = k < 5;
+        set.covariates.push_back(c);
+      }
+      while (page.poses.size() < sets) page.poses.push_back(page.poses[0]);
+      const std::string text = html(page, web);
+      EXPECT_LT(text.size(), 1500000U) << sets << " sets";
+      EXPECT_THAT(text, HasSubstr("mean position error over 12000 poses"));
+    }
+  }
+}
+
+TEST(Report, TheScriptGetsTheNumbersThatWerePutIn) {
+  Page page = example(50);
+  PagePoses& set = page.poses[0];
+  set.title = "</script><!-- \"quoted\" \\ \x01 \xff";
+  set.covariates = {{"time [s]", {}, true}};
+  for (std::size_t k = 0; k < 50; ++k) {
+    set.covariates[0].values.push_back(3600.0 * static_cast<double>(k));
+    set.poses[k].line = k + 2 + (k > 40 ? 5 : 0);  // five lines without a pose
+  }
+  set.poses[7].outlier = true;
+  MeasurementFrames frames;
+  frames.f.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
+  frames.e.position_m = {0.01, -0.02, 0.03};
+  set.frames = frames;
+  const std::string text = web_data(page, 3000);
+  EXPECT_EQ(text.find('<'), std::string::npos);
+  const auto j = nlohmann::json::parse(text);
+  const auto& s = j.at("sets").at(0);
+  EXPECT_EQ(s.at("title").get<std::string>().substr(0, 22), "</script><!-- \"quoted\"");
+  ASSERT_EQ(s.at("q").size(), 300U);
+  for (std::size_t k = 0; k < 50; ++k) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      EXPECT_NEAR(s.at("q").at(6 * k + i).get<double>() * j.at("joint_unit_deg").get<double>(),
+                  degrees(set.poses[k].q_rad[i]), 6e-4);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(s.at("before").at(3 * k + i).get<double>() * j.at("error_unit_mm").get<double>(),
+                  set.poses[k].before_m[i] * 1e3, 1e-5);
+      EXPECT_NEAR(s.at("after").at(3 * k + i).get<double>() * j.at("error_unit_mm").get<double>(),
+                  set.poses[k].after_m[i] * 1e3, 1e-5);
+    }
+    EXPECT_NEAR(s.at("turned_after").at(k).get<double>() * j.at("angle_unit_deg").get<double>(),
+                degrees(*set.poses[k].after_rad), 1e-6);
+    EXPECT_EQ(s.at("line").at(k), set.poses[k].line);
+    EXPECT_EQ(s.at("covariates").at(0).at("values").at(k).get<double>(), 3600.0 * static_cast<double>(k));
+  }
+  EXPECT_EQ(s.at("outlier"), nlohmann::json({7}));
+  EXPECT_NEAR(s.at("floor_mm").get<double>(), 0.06, 1e-9);
+  // From the frame of the measurement back to F0.
+  const Eigen::Vector3d e(1, -2, 5);
+  const Eigen::Vector3d back = frames.f.orientation.inverse() * e;
+  for (std::size_t row = 0; row < 3; ++row) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      sum += s.at("turn").at(row).at(i).get<double>() * e[static_cast<Eigen::Index>(i)];
+    EXPECT_NEAR(sum, back[static_cast<Eigen::Index>(row)], 1e-4);
+  }
+  EXPECT_EQ(s.at("point"), nlohmann::json({0.01, -0.02, 0.03}));
+  // Numbers that are none must not end the page.
+  set.poses[0].after_m = {std::nan(""), HUGE_VAL, -HUGE_VAL};
+  set.covariates[0].values[0] = std::nan("");
+  EXPECT_TRUE(nlohmann::json::accept(web_data(page, 3000)));
+  // A part of the poses is numbered.
+  const auto part = nlohmann::json::parse(web_data(page, 20)).at("sets").at(0);
+  EXPECT_EQ(part.at("number").size(), 20U);
+  EXPECT_EQ(part.at("total"), 50);
 }
 
 TEST(Report, EscapesWhatPeopleAndFilesSay) {
@@ -104,7 +249,8 @@ TEST(Report, EscapesWhatPeopleAndFilesSay) {
                 {"https://elsewhere", "bad"}};
   page.poses[0].title = page.poses[0].about = page.poses[0].before = page.poses[0].after = evil;
   page.parameters[0].name = page.confounded[0].parameter = page.confounded[0].with[0] = evil;
-  const std::string text = html(page);
+  EXPECT_EQ(unbalanced(without_scripts(html(page), has_web_parts() ? 2 : 0)), "");
+  const std::string text = html(page, false);
   EXPECT_EQ(unbalanced(text), "");
   EXPECT_THAT(text, Not(HasSubstr("<script")));
   EXPECT_THAT(text, Not(HasSubstr("javascript:")));
@@ -118,18 +264,23 @@ TEST(Report, ShowsTheNumbersThatWerePutIn) {
   pose.before_m = {3e-3, 0, 4e-3};
   pose.after_m = {0, 3e-5, 4e-5};
   page.poses[0].poses = {pose};
-  const std::string text = html(page);
+  const std::string text = html(page, false);
   EXPECT_THAT(text,
               HasSubstr("<span class=\"before\">5.00 mm</span> → <span class=\"after\">0.0500 mm</span>"));
   EXPECT_THAT(text, HasSubstr("100.0 ×"));
   EXPECT_THAT(text, Not(HasSubstr("mean [deg]"))) << "no orientation is known";
-  EXPECT_THAT(text, HasSubstr("<td>-0.08012</td><td>0.00034</td><td>deg</td><td>236</td>"));
+  EXPECT_THAT(text, HasSubstr("<td>-0.08012</td><td>0.00034</td><td>deg</td><td>236</td><td></td>"));
   EXPECT_THAT(
       text,
       HasSubstr(
           "<tr class=\"pale\"><th scope=\"row\">joint_compliance[joint=2].rad_per_nm</th><td>1.5e-5</td>"
           "<td>1.3e-5</td><td>rad/(N·m)</td>"));
   EXPECT_THAT(text, HasSubstr("<code>base.z_mm</code>: carried by <code>link1.d_mm</code>"));
+  // The one that carries says so in the table too.
+  page.parameters.push_back({"link1.d_mm", 0.4, 0.01});
+  EXPECT_THAT(
+      html(page, false),
+      HasSubstr("<td>0.400</td><td>0.010</td><td>mm</td><td>40.0</td><td><code>base.z_mm</code></td>"));
 }
 
 TEST(Report, NothingGivenLeavesNoTrace) {
@@ -159,6 +310,27 @@ std::vector<double> coordinates(const std::string& svg) {
   return found;
 }
 
+/// Where the dots of a drawing are: "M1 2h0", and from there "m-3-4h0".
+std::vector<std::pair<double, double>> dots(const std::string& svg) {
+  std::vector<std::pair<double, double>> found;
+  for (std::size_t at = svg.find(" d=\""); at != std::string::npos; at = svg.find(" d=\"", at + 1)) {
+    double x = 0, y = 0;
+    for (std::size_t k = at + 4; svg[k] != '"'; ++k) {
+      if (svg[k] != 'M' && svg[k] != 'm') continue;
+      const char* text = svg.c_str() + k + 1;
+      char* end = nullptr;
+      const double first = std::strtod(text, &end);
+      const double second = std::strtod(end, &end);
+      const bool relative = svg[k] == 'm';
+      x = first + (relative ? x : 0);
+      y = second + (relative ? y : 0);
+      if (*end == 'h') found.emplace_back(x, y);
+    }
+  }
+  EXPECT_GT(found.size(), 100U);
+  return found;
+}
+
 TEST(Report, EverythingIsDrawnInsideTheFrame) {
   // Zeros, equal numbers, six decades, an outlier: what makes axes go wrong.
   const std::vector<ErrorPairs> cases{
@@ -178,13 +350,20 @@ TEST(Report, EverythingIsDrawnInsideTheFrame) {
       EXPECT_LT(occurrences(svg, "class=\"tick\""), 40U) << svg;
     }
   }
-  std::vector<PagePose> poses(50);
-  for (const std::size_t joint : {0U, 5U}) {
-    EXPECT_EQ(unbalanced(plot_against_joint(poses, joint)), "") << "all at the same angle";
+  for (const std::size_t count : {50U, 3000U}) {
+    std::vector<PagePose> poses(count);
+    std::vector<double> values(count, 7);
+    EXPECT_EQ(unbalanced(plot_against(poses, values, "q1 [deg]", "joint 1")), "") << "all at the same angle";
+    for (std::size_t k = 0; k < count; ++k) {
+      values[k] = std::sin(static_cast<double>(k)) * 170;
+      poses[k].after_m = {1e-4 * std::cos(static_cast<double>(3 * k)), 0, 1e-5};
+    }
     poses[7].after_m = {1, -1, 1};
-    for (const double v : coordinates(plot_against_joint(poses, joint))) {
-      ASSERT_GE(v, 0);
-      ASSERT_LE(v, 360);
+    for (const auto& [x, y] : dots(plot_against(poses, values, "q1 [deg]", "joint 1"))) {
+      ASSERT_GE(x, 0);
+      ASSERT_LE(x, 360);
+      ASSERT_GE(y, 0);
+      ASSERT_LE(y, 220);
     }
   }
 }

@@ -94,6 +94,12 @@ export function roundDown(v) {
   return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
 }
 
+/** The same from above. */
+export function roundUp(v) {
+  const below = roundDown(v);
+  return below >= v * (1 - 1e-9) ? below : roundDown(2.6 * below);
+}
+
 /** Three significant digits without an exponent, as the tables have it. */
 export function shown(v) {
   if (!(Math.abs(v) > 0)) return '0';

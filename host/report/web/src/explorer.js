@@ -1,6 +1,6 @@
 import uPlot from 'uplot';
 import {colours, onColours} from './colours.js';
-import {roundDown, shown} from './data.js';
+import {roundDown, roundUp, shown} from './data.js';
 import {check, choice, element, select} from './elements.js';
 
 // As plots.cpp: a logarithmic axis where one number is this many times another.
@@ -27,7 +27,9 @@ function classes(before, after, log) {
   if (!(high > 0)) high = 1;
   const count = Math.round(Math.min(Math.max(2 * Math.cbrt(before.length) + 8, 12), 40));
   const positive = all.filter((v) => v > 0);
-  const low = log ? Math.max(least(positive), mean(after) / 30) : Math.min(least(all), 0);
+  // With round ends, as the axis has them. One lucky pose near zero must not press all the others together.
+  const low = log ? roundDown(Math.max(least(positive), mean(after) / 30)) : Math.min(least(all), 0);
+  if (log) high = roundUp(high);
   return Array.from({length: count + 1}, (_, k) =>
     log ? low * (high / low) ** (k / count) : low + ((high - low) * k) / count);
 }
@@ -124,22 +126,19 @@ export class Explorer {
     // Of each decade 1, 2 and 5 are named where there is room, else 1 alone.
     const decades = (u, splits, axis) => {
       const scale = u.scales[u.axes[axis].scale];
-      const room = (axis === 0 ? u.over.clientWidth : 3 * u.over.clientHeight) / Math.log10(scale.max / scale.min);
-      const named = room > 120 ? /^[125]/ : /^1/;
-      return splits.map((v) => (v !== null && named.test(v.toExponential(3)) ? v : null));
+      const room = (axis === 0 ? u.width - 64 : 3 * (height - 64)) / Math.log10(scale.max / scale.min);
+      const named = room > 120 ? /^[125]\.0+e/ : /^1\.0+e/;
+      return splits.map((v) => (v !== null && named.test(v.toExponential(6)) ? v : null));
     };
     const log125 = {filter: decades, grid: {stroke: c.grid, width: 1, filter: decades},
       ticks: {stroke: c.axis, width: 1, size: 4, filter: decades}};
     // From one round number to another.
-    const logRange = (u, low, high) => {
-      const up = roundDown(high);
-      return [roundDown(low), up >= high * 0.999 ? up : roundDown(high * 2.5)];
-    };
+    const logRange = (u, low, high) => (low > 0 ? [roundDown(low), roundUp(high)] : [0.1, 1]);
     return {
       width: Math.max(at.clientWidth, 200), height, legend: {show: false}, padding: [10, 12, 0, 0],
       cursor: {drag: {x: false, y: false}, points: {show: false}, y: false, x: false},
       scales: {
-        x: {time: false, distr: logX ? 3 : 1, range: logX ? (u, low, high) => [low, high] : (u, low, high) => {
+        x: {time: false, distr: logX ? 3 : 1, range: logX ? logRange : (u, low, high) => {
           const margin = high > low ? 0.03 * (high - low) : 1;
           return hooks.stepped ? [low, high] : [low - margin, high + margin];
         }},
