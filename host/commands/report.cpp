@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "catalogue/catalogue.hpp"
@@ -99,6 +101,16 @@ PagePoses Report::poses_of(const std::string& text) const {
     }
     set.poses.push_back(pose);
   }
+  // Whatever of the context stands beside the joints, under the names of data files.
+  static constexpr std::array<std::array<const char*, 2>, 3> recorded{
+      {{"payload_kg", "payload [kg]"}, {"temp_c", "temperature [°C]"}, {"time_s", "time [s]"}}};
+  for (const auto& [column, shown] : recorded) {
+    const auto at = before.find(column);
+    if (!at) continue;
+    PageCovariate c{shown, {}};
+    for (const CsvRow& row : before.rows) c.values.push_back(before.number(row, *at, unit::si));
+    set.covariates.push_back(std::move(c));
+  }
   return set;
 }
 
@@ -160,7 +172,7 @@ void add_report(CLI::App& app) {
   command
       ->add_option("--errors", options->errors,
                    "Where an arm went: two files with q1_deg … q6_deg, dx_mm dy_mm dz_mm and, where known, "
-                   "distance_deg; "
+                   "distance_deg, payload_kg, temp_c, time_s; "
                    "may be given several times")
       ->type_name(errors_form)
       ->expected(1)

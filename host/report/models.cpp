@@ -52,6 +52,7 @@ std::optional<std::vector<RowResidual>> left_out(const Identification& r, const 
 
 std::vector<double> lengths(const std::vector<RowResidual>& errors) {
   std::vector<double> out;
+  out.reserve(errors.size());
   for (const RowResidual& e : errors) out.push_back(e.position_m.norm());
   return out;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "report/escape.hpp"
 #include "report/shown_poses.hpp"
@@ -432,13 +433,17 @@ std::string plot_against(const std::vector<PagePose>& poses, const std::vector<d
   static constexpr std::array<const char*, 3> fine{"fine x", "fine y", "fine z"};
   const std::vector<std::size_t> shown = shown_poses(poses, detail.dots_of_three);
   for (std::size_t k = 0; k < 3; ++k) {
-    std::string d;
     std::vector<std::array<double, 2>> places;
+    places.reserve(shown.size());
     for (const std::size_t n : shown)
       places.push_back({px(x.at(values[n])), py(std::clamp(y.at(poses[n].after_m[k] * 1e3), 0.0, 1.0))});
-    for (const auto& place : places) d += dot(place[0], place[1]);
-    poses.size() > 60 ? plot.path(places.size() > 200 ? fine_dots(places) : d, fine[k])
-                      : plot.path(d, kind[k]);
+    std::string d;
+    if (places.size() > 200) {
+      d = fine_dots(std::move(places));
+    } else {
+      for (const auto& [at, value] : places) d += dot(at, value);
+    }
+    plot.path(d, poses.size() > 60 ? fine[k] : kind[k]);
   }
   return plot.done();
 }

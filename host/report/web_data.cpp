@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "report/shown_poses.hpp"
@@ -120,8 +121,11 @@ Json set_json(const PagePoses& set, std::size_t limit) {
     for (const std::size_t k : rows) {
       const double v = k < c.values.size() ? std::round(c.values[k] / unit) * unit : 0;
       // A whole number where it is one: shorter.
-      v == std::round(v) && std::abs(v) < 1e9 ? values.push_back(static_cast<std::int64_t>(v))
-                                              : values.push_back(short_number(v, 5));
+      if (v == std::round(v) && std::abs(v) < 1e9) {
+        values.push_back(static_cast<std::int64_t>(v));
+      } else {
+        values.push_back(short_number(v, 5));
+      }
     }
     j["covariates"].push_back({{"name", c.name}, {"values", values}});
   }

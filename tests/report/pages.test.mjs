@@ -62,8 +62,8 @@ before(async () => {
     pages.diagnose);
   // The files of where an arm went: here the joints of the data with made-up errors, a row's own number among them.
   const {q1_deg: q1, ...rest} = csv('others.csv');
-  const row = (k, size) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k]), size, 0, -size / (k + 1)].join(',');
-  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm';
+  const row = (k, size) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k]), size, 0, -size / (k + 1), k % 2].join(',');
+  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm,payload_kg';
   for (const [name, size] of [['went_before.csv', 1], ['went_after.csv', 0.1]]) {
     writeFileSync(at(name), `${[head, ...q1.map((_, k) => row(k, size))].join('\n')}\n`);
   }
@@ -301,6 +301,7 @@ test('the plan has beams, bodies and all its poses', async () => {
 test('several sets: one is chosen, each has its own plots', async () => {
   const {page, troubles, close} = await open(browser, at(pages.report));
   assert.equal(await page.locator('.explore .uplot').count(), 4);
+  assert.deepEqual(dataOf(pages.report).sets.map((s) => s.covariates.some((c) => c.name === 'payload [kg]')), [true, true]);
   const first = await picture(page);
   await page.locator('.view3d select').selectOption({label: 'Back'});
   await settled(page);

@@ -398,7 +398,7 @@ export class ArmView {
         + `${mm(this.square / factor)} of error. The arm is the nominal one.`
         + (set.count < set.total ? ` ${set.count} of ${set.total} poses are drawn.` : '');
     }
-    const q = Array.from(jointsOf(set, this.pose), (v, j) => `q${j + 1} ${((v * 180) / Math.PI).toFixed(1)}°`).join(', ');
+    const q = Array.from(jointsOf(set, this.pose), (v, j) => `q${j + 1} ${(Math.round((v * 1800) / Math.PI) / 10 + 0).toFixed(1)}°`).join(', ');
     const said = [element('b', {}, `Pose ${plan ? this.pose + 1 : set.number[this.pose]}`), ` of ${plan ? set.count : set.total}`];
     if (plan) {
       if (set.payload.length > 0) said.push(`, with ${set.payload[this.pose]} kg`);
