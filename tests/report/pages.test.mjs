@@ -77,8 +77,12 @@ after(() => browser?.close());
 test('the arm is drawn where the forward model has it', () => {
   writeFileSync(at('one.csv'), 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm\n0,0,0,0,0,0,1,0,0\n');
   const names = ['abb-irb120', 'kuka-kr6-r900', 'rx160l', 'tx60l', 'ur10', 'ur5'];
-  for (const name of names) {
-    const file = join(source, `host/robots/${name}.yaml`);
+  // None of them has beta; one that has is made.
+  const skewed = readFileSync(robot, 'utf8').replace(/(theta_deg:[^}]*?)(beta_deg: *[-\d.]+ *, *)?(min_deg)/g, '$1beta_deg: 7, $3');
+  assert.notEqual(skewed, readFileSync(robot, 'utf8'));
+  writeFileSync(at('skewed.yaml'), skewed);
+  for (const name of [...names, 'skewed']) {
+    const file = name === 'skewed' ? at('skewed.yaml') : join(source, `host/robots/${name}.yaml`);
     // Inside the limits of all of them.
     writeFileSync(at('joints.csv'), ['q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg', '10,20,-30,40,50,60', '-80,-35,25,-70,-20,100',
       '0,0,0,0,0,0'].join('\n'));
@@ -248,9 +252,11 @@ test('errors against everything that was recorded, and a dot that is clicked', a
     }
     assert.ok(await inked(page, '.histogram') > 1500);
   }
-  // Every dot says its pose; clicked, the arm goes there.
+  // Every dot says its pose, and is where that pose's value is; clicked, the arm goes there.
   await page.locator('.explore select').first().selectOption('size');
-  await against.selectOption({label: 'order of the data'});
+  await against.selectOption({label: 'q1 [deg]'});
+  const {q1_deg: values} = csv('fitted.csv');
+  const [low, high] = [Math.min(...values), Math.max(...values)];
   await settled(page);
   const inSight = async () => {
     await page.waitForTimeout(400);  // the page may still be scrolling to the arm
@@ -263,10 +269,14 @@ test('errors against everything that was recorded, and a dot that is clicked', a
     for (let down = 0.02; down < 1; down += 0.08) {
       await page.mouse.move(plot.x + share * plot.width, plot.y + down * plot.height);
       const said = await page.textContent('.explore .readout');
-      const pose = said.match(/^Pose (\d+) \(line (\d+)\): order of the data (\d+)/);
+      const pose = said.match(/^Pose (\d+) \(line (\d+)\): q1 \[deg\] (-?[\d.]+)/);
       if (!pose) continue;
+      const value = values[Number(pose[1]) - 1];
       assert.equal(pose[1], String(Number(pose[2]) - 1));
-      assert.equal(pose[1], pose[3].replace(/\.0*$/, ''));
+      assert.ok(Math.abs(Number(pose[3]) - value) <= 0.006 * Math.abs(value) + 1e-3, `${said} ${value}`);
+      // The axis reaches 3 % further than the values on both sides; a dot is read from 24 pixels away.
+      const expected = ((value - low) / (high - low) + 0.03) / 1.06;
+      assert.ok(Math.abs(expected - share) * plot.width < 25, `${said} ${share} ${expected}`);
       await page.mouse.down();
       await page.mouse.up();
       assert.match(await page.textContent('.view3d .readout'), new RegExp(`^Pose ${pose[1]} of 60`));
