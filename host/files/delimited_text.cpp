@@ -223,8 +223,8 @@ std::string DelimitedText::column_label(std::size_t column) const {
   return header ? header->cells[column] : fmt::format("column {}", column + 1);
 }
 
-DelimitedText read_delimited(const std::string& path, const DialectChoice& choice,
-                             const IsHeader& is_header) {
+DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
+                             const std::string& header) {
   const std::string content = read_file(path);
   std::string_view text = content;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -276,6 +276,9 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
     return out;
   }
 
+  if (!header.empty()) {
+    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text));
+  }
   std::vector<Line> table;
   for (const Line& line : lines) {
     if (line.comment || (table.empty() && is_remark(line.text))) {

@@ -55,9 +55,11 @@ using IsHeader = std::function<bool(const std::vector<std::string>& cells)>;
 /// Reads a table. The header is the first line, comment or not, that `is_header` takes; all lines after it are rows or
 /// comments (# // ! % at the beginning). Where there is none, all lines but remarks ("Key: value", "units …") are rows, and
 /// the last three cells of each are numbers. Empty lines are skipped.
+/// `header` says what header is expected where there must be one.
 /// \throws InputError  absent, empty, not 8-bit text; a row with another number of cells (file:line); no table; without
 ///                     header two ways to part the fields that differ
-DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header);
+DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
+                             const std::string& header = "");
 
 /// A number with this decimal mark and no other sign in it; nothing where it is none.
 std::optional<double> parse_number(std::string_view text, char decimal, const Unit& unit);

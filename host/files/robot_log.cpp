@@ -124,7 +124,11 @@ LogMap load_log_map(const std::string& path) {
 }
 
 RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotFile& robot) {
-  DelimitedText table = read_delimited(path, map.dialect, [&map](const std::vector<std::string>& cells) {
+  const std::string header = map.joints ? fmt::format("a header with the columns of {}",
+                                                      map.path.empty() ? "--joint-columns" : map.path)
+                                        : "a header with the columns q1 … q6 (or j1 …, a1 …, joint1 …, axis1 "
+                                          "…), or --joint-columns or --map";
+  const auto is_header = [&map](const std::vector<std::string>& cells) {
     for (std::size_t j = 0; j < joint_count; ++j) {
       const auto at = map.joints ? find_cell(cells, (*map.joints)[j].column) : find_joint(cells, j);
       // Of the columns that a map names one is enough: the header is found, and what is missing is said by name.
@@ -132,15 +136,8 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotF
       if (!map.joints && !at) return false;
     }
     return !map.joints;
-  });
-  if (!table.header) {
-    throw InputError(path, table.rows.front().line, "",
-                     map.joints ? fmt::format("a header with the columns of {}",
-                                              map.path.empty() ? "--joint-columns" : map.path)
-                                : "a header with the columns q1 … q6 (j1 …, a1 …, joint1 …, axis1 …), or "
-                                  "--joint-columns or --map",
-                     "none");
-  }
+  };
+  DelimitedText table = read_delimited(path, map.dialect, is_header, header);
   RobotLog log;
   log.path = path;
   std::vector<bool> used(table.header->cells.size());

@@ -46,9 +46,9 @@ class NamePattern {
         k += word.size();
         return true;
       };
-      if (take("{pose}", pose_, "(.+?)") || take("{reflector}", reflector_, "([a-dA-D1-4])")) continue;
+      if (take("{pose}", pose_, "(.+)") || take("{reflector}", reflector_, "([a-dA-D1-4])")) continue;
       if (pattern[k] == '*') {
-        text += ".*?";
+        text += ".*";
       } else {
         if (std::isalnum(static_cast<unsigned char>(pattern[k])) == 0) text += '\\';
         text += pattern[k];
