@@ -51,7 +51,16 @@ class Source {
   }
   /// The word that ends before `at`, blanks left out.
   std::string word_before(std::size_t at) const {
-    while (at > 0 && is_blank(text_[at - 1])) --at;
+    const auto skip_blanks = [this, &at] {
+      while (at > 0 && is_blank(text_[at - 1])) --at;
+    };
+    skip_blanks();
+    // The size of an array: name{3} or name[3].
+    if (at > 0 && (text_[at - 1] == '}' || text_[at - 1] == ']')) {
+      const auto open = text_.find_last_of("{[", at - 1);
+      if (open != std::string_view::npos) at = open;
+      skip_blanks();
+    }
     const std::size_t end = at;
     while (at > 0 && is_word(text_[at - 1])) --at;
     return std::string(text_.substr(at, end - at));

@@ -299,7 +299,8 @@ TEST(CorrectedUrdf, AnotherArmIsRefusedByItsJoint) {
     } catch (const InputError& e) {
       EXPECT_EQ(e.file(), urdf);
       EXPECT_THAT(e.field(), testing::StartsWith("joint '"));
-      EXPECT_THAT(e.found(), testing::AllOf(testing::HasSubstr(" mm and "), testing::HasSubstr("another arm")));
+      EXPECT_THAT(e.found(),
+                  testing::AllOf(testing::HasSubstr(" mm and "), testing::HasSubstr("another arm")));
     }
   }
 }
