@@ -55,6 +55,9 @@ std::string of_bus(const std::string& message, bool silent) {
                : "";
   }
   if (text.starts_with("can:")) {
+    if (text.find("no CAN sockets") != std::string_view::npos)
+      return "\"modprobe can_raw\" loads the kernel's CAN, where it has one; \"hil/with-vcan COMMAND\" gives "
+             "any machine a bus to try";
     const std::string interface = where.substr(4, where.find(':', 4) - 4);
     return fmt::format(
         "\"ip -details link show {}\" says whether the interface is up and at which bit rate; then check the "
@@ -81,8 +84,8 @@ std::string hint(const std::exception& error) {
     const bool silent = !refused && (dynamic_cast<const NoAnswer*>(&error) != nullptr ||
                                      message.find("cannot be opened") != std::string::npos ||
                                      message.find("connect") != std::string::npos ||
-                                     message.find("no such interface") != std::string::npos ||
-                                     message.find("No such device") != std::string::npos);
+                                     message.find("CAN sockets") != std::string::npos ||
+                                     message.find("interface") != std::string::npos);
     return of_bus(message, silent);
   }
   if (dynamic_cast<const DoubtfulResult*>(&error) != nullptr &&
