@@ -396,7 +396,9 @@ Eigen::Vector3d kuka_angles(const Eigen::Matrix3d& r) {
 
 std::optional<ProgramLanguage> program_language(const std::string& path) {
   const std::string ending = lower(std::filesystem::path(path).extension().string());
-  if (ending == ".src" || ending == ".dat") return ProgramLanguage::kuka;
+  if (ending == ".src") return ProgramLanguage::kuka;
+  // Tables are called .dat as well; they have no braces.
+  if (ending == ".dat" && read_file(path).find('{') != std::string::npos) return ProgramLanguage::kuka;
   if (ending == ".mod" || ending == ".modx" || ending == ".prg" || ending == ".sys")
     return ProgramLanguage::rapid;
   if (ending == ".dtx") return ProgramLanguage::val3;

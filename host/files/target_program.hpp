@@ -49,7 +49,7 @@ struct TargetProgram {
   std::vector<std::string> warnings;  ///< targets that were seen and cannot be corrected
 };
 
-/// By the ending of the file's name; nothing for .csv and others.
+/// By the ending of the file's name; nothing for .csv and others. \throws InputError  a .dat that cannot be read
 std::optional<ProgramLanguage> program_language(const std::string& path);
 
 /// \throws InputError  file absent; a target that is incomplete or relative (file:line); no targets

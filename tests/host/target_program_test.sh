@@ -133,6 +133,11 @@ flipped = re.sub(r"T '?B?\d+'?", "T 63", dat[5])
 refuses("r.dat", flipped, "--frame", "0,0,0,180,0,0", says=("r.dat:1", "XP2"))
 refuses("t.csv", read("t.csv"), "--start", "0,0,0,0,0,0", says=("--start",), code=2)
 
+# A table that is called .dat is a table.
+write("table.dat", read("t.csv"))
+done(*base, "--targets", "table.dat", "-o", "table.out", "--quiet")
+if read("table.out") != read("c.csv"): fail("table.dat")
+
 # --- ABB: quaternions and quadrants
 abb = root + "/host/robots/abb-irb120.yaml"
 limits = [(-165, 165), (-110, 110), (-110, 70), (-160, 160), (-120, 120), (-400, 400)]
