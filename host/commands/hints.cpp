@@ -40,6 +40,8 @@ std::string of_input(const InputError& e) {
     return "\"flexcomp import --joints LOG.csv\" makes a data file of an instrument's export and a robot's "
            "log";
   }
+  if (e.expected().starts_with("XML") && !e.file().ends_with(".urdf") && !e.file().ends_with(".xml"))
+    return "an instrument's points become data with --joints LOG.csv --robot ROBOT.yaml";
   if (expects("look like radians") || e.found().find("look like radians") != std::string::npos)
     return "\"flexcomp import --joint-unit rad\" reads a log in radians";
   return {};

@@ -201,6 +201,7 @@ for command, status, says in (
         ("flexcomp identify --data measured.csv -o x.yaml", 2, '"flexcomp identify --help"'),
         ("flexcomp identify --robot tx60.yaml --data measured.csv -o x.yaml", 3, "hint: there is tx60l.yaml"),
         ("flexcomp identify --robot tx60l.yaml --data log.csv -o x.yaml", 3, "flexcomp import --joints"),
+        ("flexcomp import tracker.txt -o x.yaml", 3, "--joints LOG.csv"),
         ("flexcomp status --of modbus-tcp:127.0.0.1:%d:1" % port, 4, "reachable"),
         ("flexcomp status --of can:nocan9:3", 4, "hint: "),
         ("flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data slipped.csv", 5, "flexcomp diagnose")):
