@@ -2,12 +2,17 @@
 /// The command `flexcomp`: one subcommand per file of commands/, and the one place that turns what was thrown into an
 /// exit status.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
+#include "commands/colour.hpp"
 #include "commands/commands.hpp"
+#include "commands/hints.hpp"
 #include "errors.hpp"
 
 namespace {
@@ -16,8 +21,13 @@ using namespace flexcomp::host;
 
 int status(ExitStatus s) { return static_cast<int>(s); }
 
+void give_hint(const std::string& text) {
+  if (!text.empty()) fmt::print(stderr, "{} {}\n", painted("hint:", Colour::note, STDERR_FILENO), text);
+}
+
 int give_up(ExitStatus s, const std::exception& e) {
-  fmt::print(stderr, "flexcomp: {}\n", e.what());
+  fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), e.what());
+  give_hint(hint(e));
   return status(s);
 }
 
@@ -49,6 +59,7 @@ int main(int argc, char** argv) {
   add_export(app);
   add_study(app);
   add_import(app);
+  add_completion(app);
   // The help text would end in the middle of a line.
   for (CLI::App* command : app.get_subcommands({})) command->footer(command->get_footer() + "\n");
   try {
@@ -56,7 +67,9 @@ int main(int argc, char** argv) {
     return status(ExitStatus::done);
   } catch (const CLI::ParseError& e) {
     // Asking for help or the version ends here too, with 0.
-    return app.exit(e) == 0 ? status(ExitStatus::done) : status(ExitStatus::usage);
+    if (app.exit(e) == 0) return status(ExitStatus::done);
+    give_hint(usage_hint(app, std::vector<std::string>(argv + 1, argv + argc)));
+    return status(ExitStatus::usage);
   } catch (const InputError& e) {
     return give_up(ExitStatus::input_refused, e);
   } catch (const BusError& e) {

@@ -1,8 +1,11 @@
 #include "flexcomp_firmware/canopen.hpp"
 
+#include <array>
+#include <cstddef>
 #include <cstring>
 
 #include "flexcomp/bytes.hpp"
+#include "flexcomp/wire/canopen_dictionary.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -12,9 +15,9 @@ using wire::ByteOrder;
 
 namespace {
 
-enum class Access : std::uint8_t { ro, wo, rw };
+using co::Access;
 
-/// One entry of the object dictionary; size 0 where it varies.
+/// One entry of the object dictionary as it is served; size 0 where it varies.
 struct Entry {
   std::uint16_t index;
   std::uint8_t sub;
@@ -22,53 +25,16 @@ struct Entry {
   std::uint16_t size;
 };
 
-constexpr Entry dictionary[] = {
-    {co::device_type, 0, Access::ro, 4},
-    {co::error_register, 0, Access::ro, 1},
-    {co::device_name, 0, Access::ro, 0},
-    {co::software_version, 0, Access::ro, 0},
-    {co::store_parameters, 0, Access::ro, 1},
-    {co::store_parameters, 1, Access::rw, 4},
-    {co::restore_parameters, 0, Access::ro, 1},
-    {co::restore_parameters, 1, Access::rw, 4},
-    {co::heartbeat_time, 0, Access::rw, 2},
-    {co::identity, 0, Access::ro, 1},
-    {co::identity, 1, Access::ro, 4},
-    {co::identity, 2, Access::ro, 4},
-    {co::identity, 3, Access::ro, 4},
-    {co::identity, 4, Access::ro, 4},
-    {co::sdo_server, 0, Access::ro, 1},
-    {co::sdo_server, 1, Access::ro, 4},
-    {co::sdo_server, 2, Access::ro, 4},
-    {co::capability, 0, Access::ro, wire::capability_bytes},
-    {co::status, 0, Access::ro, wire::status_bytes},
-    {co::status_for_people, 0, Access::ro, 1},
-    {co::status_for_people, 1, Access::ro, 2},
-    {co::status_for_people, 2, Access::ro, 2},
-    {co::status_for_people, 3, Access::ro, 2},
-    {co::status_for_people, 4, Access::ro, 2},
-    {co::status_for_people, 5, Access::ro, 4},
-    {co::status_for_people, 6, Access::ro, 4},
-    {co::status_for_people, 7, Access::ro, 4},
-    {co::robot, 0, Access::ro, wire::robot_record_bytes},
-    {co::image, 0, Access::ro, 1},
-    {co::image, co::image_staging, Access::wo, 0},
-    {co::image, co::image_active, Access::ro, 0},
-    {co::command, 0, Access::ro, 1},
-    {co::command, co::command_argument, Access::rw, 4},
-    {co::command, co::command_number, Access::rw, 2},
-    {co::probe, 0, Access::ro, 1},
-    {co::probe, co::probe_request, Access::rw, wire::probe_request_bytes},
-    {co::probe, co::probe_response, Access::ro, wire::probe_response_bytes},
-    {co::people, 0, Access::ro, 1},
-    {co::people, 1, Access::ro, 4},
-    {co::people, 2, Access::ro, 4},
-    {co::people, 3, Access::ro, 4},
-    {co::people, 4, Access::ro, 4},
-    {co::people, 5, Access::ro, 4},
-    {co::people, 6, Access::ro, 4},
-    {co::people, 7, Access::ro, 4},
-};
+/// The dictionary without what only people need: at compile time, so that no name takes flash.
+constexpr std::array<Entry, co::object_count> served() {
+  std::array<Entry, co::object_count> out{};
+  for (std::size_t k = 0; k < co::object_count; ++k) {
+    const co::Object& o = co::objects[k];
+    out[k] = Entry{o.index, o.sub, o.access == Access::constant ? Access::ro : o.access, o.size};
+  }
+  return out;
+}
+constexpr std::array<Entry, co::object_count> dictionary = served();
 
 const Entry* find(std::uint16_t index, std::uint8_t sub, std::uint32_t& code) {
   code = co::abort::no_object;

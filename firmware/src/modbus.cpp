@@ -1,6 +1,10 @@
 #include "flexcomp_firmware/modbus.hpp"
 
+#include <array>
+#include <cstddef>
 #include <cstring>
+
+#include "flexcomp/wire/modbus_blocks.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -31,21 +35,7 @@ void put32(std::uint8_t* p, std::uint32_t v) {
   put16(p + 2, v);
 }
 
-enum class Block : std::uint8_t {
-  capability,
-  status,
-  argument,
-  command,
-  staging_offset,
-  staging_window,
-  reading_offset,
-  reading_window,
-  probe_request,
-  probe_trigger,
-  probe_response,
-  people,
-  robot,
-};
+using map::Block;
 
 struct BlockPlace {
   Block block;
@@ -55,21 +45,16 @@ struct BlockPlace {
   bool writable;
 };
 
-constexpr BlockPlace blocks[] = {
-    {Block::capability, map::capability, map::capability_registers, true, false},
-    {Block::status, map::status, map::status_registers, true, false},
-    {Block::argument, map::argument, 2, true, true},
-    {Block::command, map::command, 1, true, true},
-    {Block::staging_offset, map::staging_offset, 2, true, true},
-    {Block::staging_window, map::staging_window, map::staging_window_registers, false, true},
-    {Block::reading_offset, map::reading_offset, 2, true, true},
-    {Block::reading_window, map::reading_window, map::reading_window_registers, true, false},
-    {Block::probe_request, map::probe_request, map::probe_request_registers, true, true},
-    {Block::probe_trigger, map::probe_trigger, 1, true, true},
-    {Block::probe_response, map::probe_response, map::probe_response_registers, true, false},
-    {Block::people, map::people, map::people_registers, true, false},
-    {Block::robot, map::robot, map::robot_registers, true, false},
-};
+/// The map without what only people need: at compile time, so that no name takes flash.
+constexpr std::array<BlockPlace, map::block_count> served() {
+  std::array<BlockPlace, map::block_count> out{};
+  for (std::size_t k = 0; k < map::block_count; ++k) {
+    const map::BlockDescription& d = map::block_descriptions[k];
+    out[k] = BlockPlace{d.block, d.address, d.registers, d.readable, d.writable};
+  }
+  return out;
+}
+constexpr std::array<BlockPlace, map::block_count> blocks = served();
 
 const BlockPlace* block_at(std::uint32_t address) {
   for (const BlockPlace& b : blocks) {

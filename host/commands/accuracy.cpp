@@ -1,10 +1,12 @@
 #include "commands/accuracy.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "commands/colour.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -23,14 +25,19 @@ nlohmann::ordered_json to_json(const Before& before) {
 
 std::string accuracy_table(const Before& before, const ErrorStatistics& after) {
   const auto line = [](const char* what, const ErrorStatistics& s) {
-    return fmt::format("  {:<24} {:>10.4f} {:>10.4f} {:>10.4f}{}\n", what, s.mean_m * 1e3, s.rms_m * 1e3,
+    return fmt::format("  {:<24} {:>10.4f} {:>10.4f} {:>10.4f}{}", what, s.mean_m * 1e3, s.rms_m * 1e3,
                        s.max_m * 1e3, s.mean_rad ? fmt::format(" {:>10.5f}", degrees(*s.mean_rad)) : "");
   };
-  std::string text = fmt::format("  {:<24} {:>10} {:>10} {:>10}{}\n", "position error", "mean mm", "rms mm",
-                                 "max mm", after.mean_rad ? fmt::format(" {:>10}", "mean deg") : "");
-  text += line("before, nominal frames", before.nominal_frames);
-  if (before.fitted_frames) text += line("before, fitted frames", *before.fitted_frames);
-  text += line("after", after);
+  const std::string head =
+      fmt::format("  {:<24} {:>10} {:>10} {:>10}{}", "position error", "mean mm", "rms mm", "max mm",
+                  after.mean_rad ? fmt::format(" {:>10}", "mean deg") : "");
+  std::string text = painted(head, Colour::head, STDOUT_FILENO) + "\n";
+  text += line("before, nominal frames", before.nominal_frames) + "\n";
+  if (before.fitted_frames) text += line("before, fitted frames", *before.fitted_frames) + "\n";
+  const ErrorStatistics& then = before.fitted_frames ? *before.fitted_frames : before.nominal_frames;
+  text +=
+      painted(line("after", after), after.mean_m < then.mean_m ? Colour::good : Colour::bad, STDOUT_FILENO) +
+      "\n";
   text.pop_back();
   return text;
 }

@@ -24,6 +24,7 @@ void add_report(CLI::App& app);
 void add_export(CLI::App& app);
 void add_study(CLI::App& app);
 void add_import(CLI::App& app);
+void add_completion(CLI::App& app);
 
 }  // namespace flexcomp::host
 

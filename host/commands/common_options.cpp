@@ -1,10 +1,12 @@
 #include "commands/common_options.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "commands/colour.hpp"
 #include "files/write_file.hpp"
 
 namespace flexcomp::host {
@@ -24,7 +26,8 @@ void CommonOptions::say(const std::string& text) const {
 }
 
 void CommonOptions::warn(const std::vector<std::string>& warnings) const {
-  for (const std::string& w : warnings) fmt::print(stderr, "warning: {}\n", w);
+  for (const std::string& w : warnings)
+    fmt::print(stderr, "{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w);
 }
 
 void CommonOptions::write_json(const nlohmann::ordered_json& result) const {

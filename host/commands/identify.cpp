@@ -1,6 +1,7 @@
 #include "identification/identify.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <string>
 
 #include "commands/accuracy.hpp"
+#include "commands/colour.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "errors.hpp"
@@ -98,8 +100,10 @@ std::vector<Row> rows_of(const Identification& r) {
 
 /// Every identified number with its standard deviation and interval, in the units of files.
 std::string parameter_table(const std::vector<Row>& rows) {
-  std::string text =
-      fmt::format("  {:<44} {:>14} {:>12}  {}\n", "parameter", "value", "+- (1 sigma)", "95 % interval");
+  std::string text = painted(fmt::format("  {:<44} {:>14} {:>12}  {}", "parameter", "value", "+- (1 sigma)",
+                                         "95 % interval"),
+                             Colour::head, STDOUT_FILENO) +
+                     "\n";
   for (const Row& row : rows) {
     text += fmt::format("  {:<44} {:>14.6g} {:>12.2g}  {:.4g} … {:.4g}{}\n", row.name, row.value, row.sigma,
                         row.low, row.high,

@@ -9,6 +9,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/import_measurements.hpp"
 #include "files/input_error.hpp"
 #include "files/quaternion.hpp"
 #include "files/write_file.hpp"
@@ -22,6 +23,7 @@ struct Import {
   CommonOptions common;
   std::string source;
   UrdfLinks links;
+  ImportMeasurements measurements;
   std::string name;
   std::string out;
 
@@ -72,8 +74,16 @@ std::vector<std::string> comment(const ImportedArm& arm, const std::string& sour
 }
 
 void Import::run() const {
+  const bool links_given = !(links.base.empty() && links.tip.empty() && links.flange.empty());
+  if (measurements.asked()) {
+    if (links_given || !name.empty())
+      throw CLI::ValidationError("--base, --tip, --flange, --name",
+                                 "belong to a robot; --joints makes data of points");
+    measurements.run(common, source, out);
+    return;
+  }
   const bool from_robot_file = is_robot_file(source);
-  if (from_robot_file && !(links.base.empty() && links.tip.empty() && links.flange.empty())) {
+  if (from_robot_file && links_given) {
     throw CLI::ValidationError("--base, --tip, --flange", "are links of a URDF; a robot file has none");
   }
   ImportedArm arm = from_robot_file ? import_robot(source) : import_urdf(source, links);
@@ -106,15 +116,26 @@ void add_import(CLI::App& app) {
   auto options = std::make_shared<Import>();
   CLI::App* command = app.add_subcommand(
       "import",
-      "A robot file from a URDF (or from a robot file whose near-parallel axes made lengths run off).\n"
-      "Exactly six revolute or continuous joints lie between base and tip, with fixed ones anywhere. "
-      "The tip moves as in the\n"
-      "URDF to 1e-9 m and rad, seen from the base: F0 is the base wherever joint 1 turns about its z "
-      "axis, else the nearest\n"
-      "frame of which that is true, and the constant transform between them is in the file's comment "
-      "and in --json.");
-  command->add_option("source", options->source, "URDF (after xacro), or a robot file (.yaml)")
-      ->type_name("URDF")
+      "What others write: an instrument's points with a robot's log into data, or a URDF into a robot file.\n"
+      "With --joints: SOURCE is a point list as SpatialAnalyzer, PolyWorks and their like export it; each "
+      "point gets the "
+      "joint\n"
+      "readings of the log by name, order or time. What has no partner is listed, what is not understood "
+      "refused.\n"
+      "Without: SOURCE is a URDF (or a robot file whose near-parallel axes made lengths run off) with "
+      "exactly six "
+      "revolute or\n"
+      "continuous joints between base and tip. The tip moves as in the URDF to 1e-9 m and rad, seen from the "
+      "base: F0 is "
+      "the base\n"
+      "wherever joint 1 turns about its z axis, else the nearest frame of which that is true, and the "
+      "constant transform "
+      "between\n"
+      "them is in the file's comment and in --json.");
+  command
+      ->add_option("source", options->source,
+                   "Point list of an instrument; or a URDF (after xacro), or a robot file (.yaml)")
+      ->type_name("FILE")
       ->required();
   command->add_option("--base", options->links.base, "Link that is to be the base [default: the root link]")
       ->type_name("LINK");
@@ -127,13 +148,20 @@ void add_import(CLI::App& app) {
                    "Link at which F6 is to lie, between joint 6 and the tip [default: tool0, else the tip]")
       ->type_name("LINK");
   command->add_option("--name", options->name, "Name of the robot [default: the file's]")->type_name("NAME");
-  command->add_option("-o,--output", options->out, "Robot file")->type_name("ROBOT.yaml")->required();
+  command->add_option("-o,--output", options->out, "Robot file, or data file with --joints")
+      ->type_name("FILE")
+      ->required();
+  options->measurements.add_to(*command);
   options->common.add_to(*command);
   command->footer(
-      "Example:\n"
-      "  xacro kr6r900sixx.xacro > kr6.urdf\n"
+      "Examples:\n"
+      "  flexcomp import tracker.txt --joints log.csv --robot tx60l.yaml -o measured.csv\n"
+      "  flexcomp import tracker.txt --joints log.csv --map map.yaml --names '*::{pose}' --unit mm --robot "
+      "tx60l.yaml -o "
+      "measured.csv\n"
       "  flexcomp import kr6.urdf --base base_link --tip tool0 --name kuka-kr6-r900 -o kr6.yaml\n"
-      "Then add payload, reflectors, noise and capsules by hand.");
+      "docs/formats.md shows the formats and a map. Payload, reflectors, noise and capsules are not in a "
+      "URDF: add yours.");
   command->callback([options] { options->run(); });
 }
 

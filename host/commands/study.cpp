@@ -181,7 +181,9 @@ void add_study(CLI::App& app) {
       ->type_name("F.html");
   options->common.add_seed_to(*command);
   options->common.add_to(*command);
-  command->footer("Example:\n  flexcomp study fig4 --json fig4.json --report fig4.html");
+  command->footer(
+      "Example:\n  flexcomp study fig2 --json fig2.json --report fig2.html\nStudies with calibrations (fig4, "
+      "fig8, …) take up to some minutes; --repeats 50 makes them shorter.");
   command->callback([options] { options->run(); });
 }
 

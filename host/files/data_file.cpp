@@ -206,6 +206,7 @@ class ColumnReader {
       const std::string near = nearest(name, known_names());
       columns.push_back(k);
       names.push_back(name);
+      if (name == point_label) continue;
       warnings.push_back(fmt::format("{}:1: column '{}' has no meaning here and is passed through{}.",
                                      table_.path, name,
                                      near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near)));
@@ -387,6 +388,22 @@ DataFile load_data(const std::string& path, const RobotFile& robot, const LoadOp
 
 DataFile load_joints(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
   return load(path, robot, options, false);
+}
+
+const std::vector<std::string>& context_names() {
+  static const std::vector<std::string> all = [] {
+    std::vector<std::string> names{"payload_kg", "temp_c"};
+    for (std::size_t k = 0; k < 3; ++k) {
+      names.push_back(com_name(k));
+      names.push_back(force_name(k));
+    }
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      names.push_back(move_name(j));
+      names.push_back(direction_name(j));
+    }
+    return names;
+  }();
+  return all;
 }
 
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns) {

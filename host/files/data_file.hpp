@@ -81,6 +81,12 @@ std::string data_text(const DataFile& data);
 /// Writes data_text() atomically. \throws std::runtime_error where the file cannot be written
 void save_data(const std::string& path, const DataFile& data);
 
+/// The columns that say under which circumstances a row was measured: payload_kg, move1_deg …, temp_c, fx_n …; not time_s.
+const std::vector<std::string>& context_names();
+
+/// A column of this name holds what the point was called where it was measured: passed through without a warning.
+constexpr const char* point_label = "point";
+
 /// Names and cells of joints and context as in a data file, for files that begin with the same columns.
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns);
 std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row);

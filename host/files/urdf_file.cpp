@@ -269,6 +269,7 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   for (std::size_t k = fork; k < to_base.size(); ++k)
     fork_to_base = fork_to_base * pose(to_base[k]->parent_joint->parent_to_joint_origin_transform);
   Pose<double> frame = inverse_of(fork_to_base);
+  arm.start = frame;
 
   // Down to the tip.
   std::vector<std::string> names;
@@ -277,6 +278,7 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   for (std::size_t k = fork; k < way.size(); ++k) {
     const urdf::Joint& joint = *way[k]->parent_joint;
     frame = frame * pose(joint.parent_to_joint_origin_transform);
+    arm.steps.push_back({joint.name, is_turning(joint), pose(joint.parent_to_joint_origin_transform)});
     if (is_turning(joint)) {
       if (names.size() < joint_count) {
         UrdfJoint& out = arm.joints[names.size()];
@@ -300,6 +302,7 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   }
   const std::size_t flange = find_flange(tree, way, last, links.flange);
   arm.flange = way[flange]->name;
+  arm.flange_steps = flange - last;
   arm.flange_after = after[flange];
   arm.tip_after = after.back();
   return arm;

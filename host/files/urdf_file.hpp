@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,13 @@ struct UrdfJoint {
   double max_speed_rad_s = 0;                       ///< 0 where unknown
 };
 
+/// One joint of the way from the base to the tip, as the file has it.
+struct UrdfStep {
+  std::string joint;
+  bool turning = false;
+  Pose<double> origin;
+};
+
 struct UrdfArm {
   std::string name;  ///< of the <robot>
   std::string base;
@@ -31,6 +39,9 @@ struct UrdfArm {
   std::array<UrdfJoint, joint_count> joints;
   Pose<double> flange_after;  ///< from the sixth joint's frame
   Pose<double> tip_after;
+  Pose<double> start;            ///< from the base to the parent of the first step; 1 where that is the base
+  std::vector<UrdfStep> steps;   ///< all joints from there to the tip
+  std::size_t flange_steps = 0;  ///< so many of them follow the sixth joint up to the flange
   Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();  ///< -z of the root link, in the base
   std::vector<std::string> warnings;
 };

@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "files/input_error.hpp"
 #include "flexcomp/forward.hpp"
@@ -67,6 +68,51 @@ std::optional<JointVector> nominal_inverse(const NominalRobot<joint_count>& robo
     for (std::size_t j = 0; j < joint_count; ++j) q[j] += step[static_cast<Eigen::Index>(j)];
   }
   return {};
+}
+
+std::vector<JointVector> nominal_inverses(const NominalRobot<joint_count>& robot,
+                                          const Pose<double>& target) {
+  // Enough that of no pose of tests/host/nominal_inverse_test.cpp (six arms) a way was missed.
+  constexpr std::uint64_t seeds = 160;
+  constexpr double same_rad = 1e-6;
+  constexpr std::array<std::uint64_t, joint_count> primes{2, 3, 5, 7, 11, 13};
+  std::vector<JointVector> out;
+  const auto add = [&out](const JointVector& q) {
+    const bool known = std::any_of(out.begin(), out.end(), [&q](const JointVector& other) {
+      for (std::size_t j = 0; j < joint_count; ++j) {
+        if (std::abs(q[j] - other[j]) > same_rad) return false;
+      }
+      return true;
+    });
+    if (!known) out.push_back(q);
+  };
+  for (std::uint64_t n = 1; n <= seeds; ++n) {
+    JointVector seed{};
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      // Halton's sequence fills the box of the limits evenly.
+      double fraction = 0;
+      double digit = 1;
+      for (std::uint64_t rest = n; rest > 0; rest /= primes[j]) {
+        digit /= static_cast<double>(primes[j]);
+        fraction += digit * static_cast<double>(rest % primes[j]);
+      }
+      const double least = std::max(robot.limits[j].min_rad, -pi);
+      const double most = std::min(robot.limits[j].max_rad, pi);
+      seed[j] = least + (most - least) * fraction;
+    }
+    const auto q = nominal_inverse(robot, target, seed);
+    if (q) add(*q);
+  }
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    for (std::size_t k = 0, count = out.size(); k < count; ++k) {
+      for (const double turn : {-2 * pi, 2 * pi}) {
+        JointVector q = out[k];
+        q[j] += turn;
+        if (q[j] >= robot.limits[j].min_rad && q[j] <= robot.limits[j].max_rad) add(q);
+      }
+    }
+  }
+  return out;
 }
 
 std::vector<JointVector> joint_commands(const TargetsFile& targets, const RobotFile& robot) {

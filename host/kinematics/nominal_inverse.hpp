@@ -19,6 +19,11 @@ std::optional<std::array<double, joint_count>> nominal_inverse(
     const NominalRobot<joint_count>& robot, const Pose<double>& target,
     const std::array<double, joint_count>& seed_rad);
 
+/// All joint commands within the limits that reach the pose, those a whole turn apart included: Newton's method from many
+/// seeds, the same in every run. Along a singularity there are infinitely many; some of them are given.
+std::vector<std::array<double, joint_count>> nominal_inverses(const NominalRobot<joint_count>& robot,
+                                                              const Pose<double>& target);
+
 /// The joint command of every target. \throws InputError with the line of a pose that is not reached from its seed
 std::vector<std::array<double, joint_count>> joint_commands(const TargetsFile& targets,
                                                             const RobotFile& robot);

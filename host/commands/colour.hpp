@@ -1,0 +1,22 @@
+/// \file
+/// Colour on a terminal, and nothing but the text anywhere else: in a pipe, in a file, where NO_COLOR is set
+/// (no-color.org) or the terminal is a dumb one.
+#ifndef FLEXCOMP_HOST_COMMANDS_COLOUR_HPP
+#define FLEXCOMP_HOST_COMMANDS_COLOUR_HPP
+
+#include <string>
+
+namespace flexcomp::host {
+
+enum class Colour { head, good, bad, note };
+
+/// Whether this stream (STDOUT_FILENO, STDERR_FILENO) is shown in colour.
+bool coloured(int stream);
+
+/// The text in a colour where the stream is shown so, else the text. Colour goes around what is already padded: columns stay
+/// where they are.
+std::string painted(const std::string& text, Colour colour, int stream);
+
+}  // namespace flexcomp::host
+
+#endif

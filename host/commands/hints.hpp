@@ -1,0 +1,21 @@
+/// \file
+/// After what went wrong: what to do next.
+#ifndef FLEXCOMP_HOST_COMMANDS_HINTS_HPP
+#define FLEXCOMP_HOST_COMMANDS_HINTS_HPP
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <string>
+#include <vector>
+
+namespace flexcomp::host {
+
+/// One line without full stop, or empty where the message says all that can be said.
+std::string hint(const std::exception& error);
+
+/// For a command line that was not understood: the nearest command or option, and whose help to read.
+std::string usage_hint(const CLI::App& app, const std::vector<std::string>& arguments);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,204 @@
+#include "commands/import_measurements.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "files/data_file.hpp"
+#include "files/declared_unit.hpp"
+#include "files/input_error.hpp"
+#include "files/point_list.hpp"
+#include "files/robot_log.hpp"
+#include "files/write_file.hpp"
+#include "measurement/joining.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+const std::map<std::string, char> delimiter_names{{"comma", ','}, {",", ','},    {"semicolon", ';'},
+                                                  {";", ';'},     {"tab", '\t'}, {"blanks", ' '}};
+const std::map<std::string, char> decimal_names{{"point", '.'}, {".", '.'}, {"comma", ','}, {",", ','}};
+const std::map<std::string, AngleConvention> angle_names{
+    {"fixed-xyz", AngleConvention::fixed_xyz},
+    {"moving-xyz", AngleConvention::moving_xyz},
+    {"rotation-vector", AngleConvention::rotation_vector}};
+const std::map<std::string, JoinBy> join_names{
+    {"name", JoinBy::name}, {"order", JoinBy::order}, {"time", JoinBy::time}};
+
+template <class Value>
+std::vector<std::string> keys_of(const std::map<std::string, Value>& names) {
+  std::vector<std::string> keys;
+  for (const auto& entry : names) keys.push_back(entry.first);
+  return keys;
+}
+
+template <class Value>
+std::optional<Value> chosen(const std::map<std::string, Value>& names, const std::string& text) {
+  return text.empty() ? std::optional<Value>() : std::optional<Value>(names.at(text));
+}
+
+/// Asks the reader of data files about the text; what it refuses is said with the line of the log that it came from.
+std::vector<std::string> checked(const std::string& text, const std::string& beside, const RobotFile& robot,
+                                 const RobotLog& log, const Joining& joining, bool force) {
+  const std::string path = fmt::format("{}.check-{}", beside, ::getpid());
+  struct Remove {
+    const std::string& path;
+    ~Remove() {
+      std::error_code ignored;
+      std::filesystem::remove(path, ignored);
+    }
+  } remove{path};
+  write_file(path, text);
+  try {
+    return load_data(path, robot, {force}).warnings;
+  } catch (const InputError& e) {
+    const std::size_t line = e.line() < 2 ? 0 : joining.log_lines[e.line() - 2];
+    throw InputError(log.path, line, e.field(), e.expected(), e.found());
+  }
+}
+
+void list(const CommonOptions& common, const std::string& what, const std::vector<std::string>& lonely) {
+  if (lonely.empty()) return;
+  std::string text = fmt::format("  {}: {}", lonely.size(), what);
+  for (const std::string& one : lonely) text += "\n    " + one;
+  common.say(text);
+}
+
+}  // namespace
+
+void ImportMeasurements::add_to(CLI::App& command) {
+  const auto group = [](CLI::Option* option) {
+    return option->group("An instrument's points and a robot's log");
+  };
+  group(command.add_option(
+            "--joints", joints,
+            "Joint readings of the measured poses, a log of the robot: makes data for identify of SOURCE"))
+      ->type_name("LOG.csv");
+  group(command.add_option("--robot", robot, "Robot file, for the joints' limits"))->type_name("ROBOT.yaml");
+  group(
+      command.add_option("--map", map, "Which column of the log is which joint, with unit, sign and offset"))
+      ->type_name("MAP.yaml");
+  group(command.add_option("--joint-columns", joint_columns, "The same in short: the six columns, in order"))
+      ->delimiter(',')
+      ->expected(static_cast<int>(joint_count))
+      ->type_name("C1,…,C6");
+  group(command.add_option("--joint-unit", joint_unit, "Unit of the log's joints where it does not tell"))
+      ->check(CLI::IsMember(angle_unit_names()));
+  group(command.add_option("--unit", unit, "Unit of the points where the export does not tell"))
+      ->check(CLI::IsMember(length_unit_names()));
+  group(command.add_option("--angle-unit", angle_unit, "Unit of the export's angles where it does not tell"))
+      ->check(CLI::IsMember(angle_unit_names()));
+  group(command.add_option("--angles", angles,
+                           "What rx ry rz mean: about fixed axes (SpatialAnalyzer), about moved ones "
+                           "(Stäubli), or one vector"))
+      ->check(CLI::IsMember(keys_of(angle_names)));
+  group(
+      command.add_option(
+          "--columns", columns,
+          "Meaning of the export's columns where its header does not tell: name,group,x,y,z,sigma,time; - is "
+          "not read"))
+      ->delimiter(',')
+      ->type_name("NAME,…");
+  group(command.add_option("--delimiter", delimiter, "What parts the export's fields [default: worked out]"))
+      ->check(CLI::IsMember(keys_of(delimiter_names)));
+  group(command.add_option("--decimal", decimal, "The export's decimal mark [default: worked out]"))
+      ->check(CLI::IsMember(keys_of(decimal_names)));
+  group(command.add_option("--coverage", coverage,
+                           "The export's uncertainties are so many standard deviations"))
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group(command.add_option("--join", by,
+                           "How points find their joints [default: name, where both files have names]"))
+      ->check(CLI::IsMember(keys_of(join_names)));
+  group(command.add_option("--names", names,
+                           "How points are called: {pose}, {reflector} (a … d, 1 … 4), * for anything, as "
+                           "'*::{pose}_{reflector}'"))
+      ->type_name("PATTERN");
+  group(command.add_option("--reflectors", reflectors,
+                           "With --join order: so many points one after the other are one pose"))
+      ->check(CLI::Range(3, 4));
+  group(command.add_flag("--repeats", repeats, "Points of one name are the same pose measured again"));
+  group(command.add_option("--tolerance", tolerance_s, "With --join time: how far apart the two may be [s]"))
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  group(command.add_option("--time-shift", shift_s,
+                           "With --join time: what to add to the instrument's times [s]"))
+      ->capture_default_str();
+  group(command.add_flag("--force", force,
+                         "Go on where input is only suspicious (readings that look like radians)"));
+}
+
+void ImportMeasurements::run(const CommonOptions& common, const std::string& source,
+                             const std::string& out) const {
+  if (robot.empty()) throw CLI::RequiredError("--robot (with --joints)");
+  if (!map.empty() && !joint_columns.empty())
+    throw CLI::ValidationError("--joint-columns", "is the short form of --map: give one of them");
+  const RobotFile robot_file = load_robot(robot);
+  LogMap how = map.empty() ? LogMap() : load_log_map(map);
+  if (!joint_unit.empty()) how.joint_unit = angle_unit_of(joint_unit);
+  if (!joint_columns.empty()) {
+    how.joints.emplace();
+    for (std::size_t j = 0; j < joint_count; ++j) (*how.joints)[j].column = joint_columns[j];
+  }
+  PointListOptions reading;
+  reading.dialect = {chosen(delimiter_names, delimiter), chosen(decimal_names, decimal)};
+  reading.columns = columns;
+  if (!unit.empty()) reading.length = length_unit_of(unit);
+  if (!angle_unit.empty()) reading.angle = angle_unit_of(angle_unit);
+  reading.angles = chosen(angle_names, angles);
+  reading.coverage = coverage;
+  const PointList points = read_point_list(source, reading);
+  const RobotLog log = read_robot_log(joints, how, robot_file);
+
+  JoinOptions joining_options;
+  if (by.empty() && !(points.names && log.names)) {
+    throw InputError(points.names ? log.path : points.path, 0, "--join",
+                     "order or time, for the points cannot be joined by name", "no column with names");
+  }
+  joining_options.by = chosen(join_names, by).value_or(JoinBy::name);
+  joining_options.names = names;
+  joining_options.reflectors = reflectors;
+  joining_options.repeats = repeats;
+  joining_options.tolerance_s = tolerance_s;
+  joining_options.shift_s = shift_s;
+  const Joining joining = join(points, log, joining_options);
+  const std::string text = data_text(joining.data);
+  common.warn(checked(text, out, robot_file, log, joining, force));
+  write_file(out, text);
+
+  const char* const kind = joining.data.kind == MeasurementKind::reflectors ? "reflector points"
+                           : joining.data.kind == MeasurementKind::pose     ? "full poses"
+                                                                            : "positions";
+  common.say(fmt::format("{}: {} rows, {} of {} joined with {} by {}", out, joining.data.rows.size(), kind,
+                         source, joints, by.empty() ? "name" : by));
+  common.say(fmt::format(
+      "  {}: {} points in {}, fields parted by {}{}", source, points.points.size(), points.length.name,
+      words(points.dialect),
+      points.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(points.unused, ", "))));
+  common.say(
+      fmt::format("  {}: {} rows, joints {}, fields parted by {}{}", joints, log.rows.size(),
+                  fmt::join(log.joint_columns, " "), words(log.dialect),
+                  log.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(log.unused, ", "))));
+  list(common, fmt::format("points of {} without joint readings, left out", source), joining.lonely_points);
+  list(common, fmt::format("rows of {} at which nothing was measured", joints), joining.lonely_rows);
+  common.write_json({{"output", out},
+                     {"rows", joining.data.rows.size()},
+                     {"measured", kind},
+                     {"join", by.empty() ? "name" : by},
+                     {"points", points.points.size()},
+                     {"log_rows", log.rows.size()},
+                     {"unit", points.length.name},
+                     {"dialect", words(points.dialect)},
+                     {"log_dialect", words(log.dialect)},
+                     {"joint_columns", log.joint_columns},
+                     {"sigma", points.sigmas},
+                     {"points_without_joints", joining.lonely_points},
+                     {"joints_without_point", joining.lonely_rows},
+                     {"columns_not_read", points.unused},
+                     {"log_columns_not_read", log.unused}});
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,68 @@
+/// \file
+/// Targets in programs of robot makers: found, changed in place, and every other byte left as it was.
+#ifndef FLEXCOMP_HOST_FILES_TARGET_PROGRAM_HPP
+#define FLEXCOMP_HOST_FILES_TARGET_PROGRAM_HPP
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "files/robot_file.hpp"
+
+namespace flexcomp::host {
+
+enum class ProgramLanguage {
+  kuka,   ///< KRL: E6AXIS, AXIS, E6POS, POS in .src and .dat
+  rapid,  ///< ABB: jointtarget and robtarget in .mod, .prg, .sys
+  val3    ///< Stäubli: <Value j1=… j6=…/> in .dtx
+};
+
+/// One target as it stands in the program: joint readings, or a pose with what it says about the branch.
+struct ProgramTarget {
+  std::size_t line = 0;
+  std::string name;  ///< empty where it has none
+  bool pose = false;
+  std::array<double, joint_count> q_rad{};
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  std::optional<unsigned> turn;                ///< KUKA's T: bit j is set where joint j + 1 is negative
+  std::optional<std::array<int, 3>> quadrant;  ///< ABB's cf1, cf4, cf6: quarter turns of joints 1, 4, 6
+
+  struct Span {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  std::vector<Span> numbers;        ///< joints, or position and orientation, where they stand in the text
+  std::optional<Span> turn_number;  ///< where `turn` stands
+  std::vector<Span> quadrant_numbers;
+};
+
+struct TargetProgram {
+  std::string path;
+  ProgramLanguage language = ProgramLanguage::kuka;
+  std::string text;
+  std::vector<ProgramTarget> targets;
+  std::vector<std::string> warnings;  ///< targets that were seen and cannot be corrected
+};
+
+/// By the ending of the file's name; nothing for .csv and others. \throws InputError  a .dat that cannot be read
+std::optional<ProgramLanguage> program_language(const std::string& path);
+
+/// \throws InputError  file absent; a target that is incomplete or relative (file:line); no targets
+TargetProgram read_program(const std::string& path, ProgramLanguage language);
+
+/// The program with its targets put as in `corrected` (same order; q or pose, turn and quadrants): numbers with 6 decimals in
+/// mm and degrees.
+std::string program_text(const TargetProgram& program, const std::vector<ProgramTarget>& corrected);
+
+/// What the words of a target say of these readings.
+unsigned turn_of(const std::array<double, joint_count>& q_rad);
+std::array<int, 3> quadrants_of(const std::array<double, joint_count>& q_rad);
+
+}  // namespace flexcomp::host
+
+#endif

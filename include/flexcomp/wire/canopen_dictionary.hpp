@@ -1,0 +1,124 @@
+/// \file
+/// The object dictionary as a table: every object with its type, access, size and name, the one home of what
+/// canopen_objects.hpp explains. The firmware serves it, the host writes the electronic data sheet (CiA 306) of it.
+#ifndef FLEXCOMP_WIRE_CANOPEN_DICTIONARY_HPP
+#define FLEXCOMP_WIRE_CANOPEN_DICTIONARY_HPP
+
+#include <cstddef>
+#include <cstdint>
+
+#include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/store_state.hpp"
+
+namespace flexcomp {
+namespace wire {
+namespace canopen {
+
+/// Data types by their index in the dictionary (CiA 301, table 44).
+enum class Type : std::uint8_t {
+  u8 = 0x05,
+  u16 = 0x06,
+  u32 = 0x07,
+  real32 = 0x08,
+  text = 0x09,
+  domain = 0x0F,
+};
+
+enum class Access : std::uint8_t {
+  constant,  ///< read-only, and never another value
+  ro,
+  wo,
+  rw
+};
+
+struct Object {
+  std::uint16_t index;
+  std::uint8_t sub;
+  Type type;
+  Access access;
+  std::uint16_t size;  ///< bytes; 0 where they vary
+  const char*
+      name;  ///< for people; sub 0 of a record: "Highest sub-index", what the record is: record_name()
+};
+
+constexpr Object objects[] = {
+    {device_type, 0, Type::u32, Access::constant, 4, "Device type"},
+    {error_register, 0, Type::u8, Access::ro, 1, "Error register"},
+    {device_name, 0, Type::text, Access::constant, 0, "Manufacturer device name"},
+    {software_version, 0, Type::text, Access::constant, 0, "Manufacturer software version"},
+    {store_parameters, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {store_parameters, 1, Type::u32, Access::rw, 4, "Save all parameters: commit what is staged"},
+    {restore_parameters, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {restore_parameters, 1, Type::u32, Access::rw, 4, "Restore all defaults: erase both sets"},
+    {heartbeat_time, 0, Type::u16, Access::rw, 2, "Producer heartbeat time, ms"},
+    {identity, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {identity, 1, Type::u32, Access::ro, 4, "Vendor-ID"},
+    {identity, 2, Type::u32, Access::ro, 4, "Product code"},
+    {identity, 3, Type::u32, Access::ro, 4, "Revision number"},
+    {identity, 4, Type::u32, Access::ro, 4, "Serial number: first bytes of the hash of the name"},
+    {sdo_server, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {sdo_server, 1, Type::u32, Access::ro, 4, "COB-ID client to server"},
+    {sdo_server, 2, Type::u32, Access::ro, 4, "COB-ID server to client"},
+    {capability, 0, Type::domain, Access::ro, capability_bytes, "Capability record"},
+    {status, 0, Type::domain, Access::ro, status_bytes, "Status record"},
+    {status_for_people, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {status_for_people, 1, Type::u16, Access::ro, 2, "State of the parameter store"},
+    {status_for_people, 2, Type::u16, Access::ro, 2, "Answer to the last command"},
+    {status_for_people, 3, Type::u16, Access::ro, 2, "Refusal of the last command"},
+    {status_for_people, 4, Type::u16, Access::ro, 2, "Faults"},
+    {status_for_people, 5, Type::u32, Access::ro, 4, "Sequence of the active set"},
+    {status_for_people, 6, Type::u32, Access::ro, 4, "Detail"},
+    {status_for_people, 7, Type::u32, Access::ro, 4, "Control cycles until a trial reverts"},
+    {robot, 0, Type::domain, Access::ro, robot_record_bytes, "Robot record"},
+    {image, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {image, image_staging, Type::domain, Access::wo, 0, "Parameter image into staging"},
+    {image, image_active, Type::domain, Access::ro, 0, "Active parameter image"},
+    {command, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {command, command_argument, Type::u32, Access::rw, 4, "Argument of the next command"},
+    {command, command_number, Type::u16, Access::rw, 2, "Command: writing runs it"},
+    {probe, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {probe, probe_request, Type::domain, Access::rw, probe_request_bytes, "Probe request record"},
+    {probe, probe_response, Type::domain, Access::ro, probe_response_bytes, "Probe response record"},
+    {people, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {people, 1, Type::real32, Access::ro, 4, "Correction of joint 1 in the last cycle, deg"},
+    {people, 2, Type::real32, Access::ro, 4, "Correction of joint 2 in the last cycle, deg"},
+    {people, 3, Type::real32, Access::ro, 4, "Correction of joint 3 in the last cycle, deg"},
+    {people, 4, Type::real32, Access::ro, 4, "Correction of joint 4 in the last cycle, deg"},
+    {people, 5, Type::real32, Access::ro, 4, "Correction of joint 5 in the last cycle, deg"},
+    {people, 6, Type::real32, Access::ro, 4, "Correction of joint 6 in the last cycle, deg"},
+    {people, 7, Type::real32, Access::ro, 4, "Largest correction of any joint since the start, deg"},
+};
+constexpr std::size_t object_count = sizeof objects / sizeof objects[0];
+
+/// What an object that has sub-indices is called.
+constexpr const char* record_name(std::uint16_t index) {
+  switch (index) {
+    case store_parameters:
+      return "Store parameters";
+    case restore_parameters:
+      return "Restore default parameters";
+    case identity:
+      return "Identity object";
+    case sdo_server:
+      return "SDO server parameter";
+    case status_for_people:
+      return "Status for people";
+    case image:
+      return "Parameter image";
+    case command:
+      return "Command";
+    case probe:
+      return "Probe";
+    case people:
+      return "Corrections for people";
+    default:
+      return "";
+  }
+}
+
+}  // namespace canopen
+}  // namespace wire
+}  // namespace flexcomp
+
+#endif
