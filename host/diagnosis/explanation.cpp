@@ -18,10 +18,6 @@ namespace {
 constexpr double margin = least_gain;
 constexpr std::size_t most_effects = 8;
 
-/// A row that nothing explains costs this much chi-square and no more: it is then an outlier (99.9 % of the chi-square of
-/// six numbers, and what it takes to say so of one row among hundreds).
-constexpr double outlier_price = 40;
-
 Block local_block(const LocalCurve& c, std::size_t index) {
   Block block;
   block.id = EffectId{.effect = Effect::joint_curve, .joint = c.joint, .coefficients = c.knots};
@@ -155,7 +151,8 @@ Explainer::Explainer(const RobotFile& robot, const std::vector<Observation>& row
       counts_(in_full(weight)),
       can_(testable(rows, columns)),
       candidates_(candidates(robot, rows, columns, start.set)),
-      variables_(variables(rows, can_)) {
+      variables_(variables(rows, can_)),
+      left_out_(rows) {
   if (counts_.size() != rows.size()) counts_.assign(rows.size(), true);
 }
 
@@ -261,6 +258,7 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
     best = search.best(most_effects, starts);
   }
 
+  best = only_what_predicts(search, std::move(best));
   out.solution = best;
   Eigen::Index from = 0;
   for (const std::size_t b : best.blocks) {
@@ -285,6 +283,37 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
     out.pieces.push_back(std::move(piece));
   }
   return out;
+}
+
+Scored Explainer::only_what_predicts(const SubsetSearch& search, Scored best) const {
+  const std::vector<Block>& blocks = search.system().blocks;
+  std::vector<bool> allowed(blocks.size(), true);
+  for (std::size_t round = 0; round < 2 * most_effects && !best.blocks.empty(); ++round) {
+    const double all = left_out_.chi2_per_number(search, best);
+    double least = all;
+    std::optional<std::size_t> idle;
+    Scored without_it;
+    for (const std::size_t b : best.blocks) {
+      Subset without;
+      for (const std::size_t other : best.blocks) {
+        if (other != b && (is_function(blocks[b]) || !same_name(blocks[other].id, blocks[b].id)))
+          without.push_back(other);
+      }
+      Scored less = search.score(without);
+      const double chi2 = left_out_.chi2_per_number(search, less);
+      if (chi2 > least) continue;
+      least = chi2;
+      idle = b;
+      without_it = std::move(less);
+    }
+    if (!idle) break;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      if (b == *idle || (!is_function(blocks[*idle]) && same_name(blocks[b].id, blocks[*idle].id)))
+        allowed[b] = false;
+    }
+    best = round < most_effects ? search.best(most_effects, {without_it.blocks}, allowed) : without_it;
+  }
+  return best;
 }
 
 void Explainer::judge(Explanation& found) const {

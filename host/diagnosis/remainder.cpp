@@ -75,6 +75,14 @@ Remainder remainder(const SubsetSearch& search, const Scored& solution) {
   return out;
 }
 
+Remainder remainder(const GapSystem& system) {
+  Remainder out;
+  out.residual = system.residual;
+  out.basis = system.nuisance;
+  out.fitted_numbers = static_cast<double>(system.nuisance.cols());
+  return out;
+}
+
 std::vector<PlaceShare> place_shares(const GapSystem& system, const Remainder& left) {
   std::vector<PlaceShare> shares;
   const double dof = system.numbers - left.fitted_numbers;

@@ -27,6 +27,8 @@ struct Remainder {
 };
 
 Remainder remainder(const SubsetSearch& search, const Scored& solution);
+/// Nothing found, the noise as declared.
+Remainder remainder(const GapSystem& system);
 
 /// Shares of all places, largest first: a motion of the place alone, free from pose to pose. p from the chi-square
 /// distribution with the moments that the noise gives.
