@@ -51,6 +51,28 @@ void add_locals(GapSystem& system, Scanned& scanned, const std::vector<LocalCurv
   }
 }
 
+void add_function(GapSystem& system, Scanned& scanned, const SmoothFunction& f,
+                  const std::vector<Variable>& variables, double cost) {
+  const Eigen::MatrixXd phi = members(f, variables);
+  const Eigen::VectorXd& place = place_column(system, f.place).column;
+  Eigen::MatrixXd columns(place.size(), phi.cols());
+  for (Eigen::Index k = 0; k < phi.cols(); ++k) columns.col(k) = times(place, f.size_rad * phi.col(k));
+  Block block;
+  block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
+  block.precision = 1;
+  block.parameters = cost;  // of having tried so many functions
+  block.margin = margin;
+  block.function_joint = f.place.body;
+  for (const std::size_t v : f.of) {
+    if (variables[v].is_order) continue;
+    if (variables[v].kind == Covariate::reading) block.function_readings.push_back(variables[v].joint);
+    if (variables[v].kind == Covariate::payload) block.function_load = true;
+  }
+  block.scanned = scanned.functions.size();
+  scanned.functions.push_back(f);
+  add_block(system, block, columns);
+}
+
 void add_functions(GapSystem& system, Scanned& scanned, const std::vector<SmoothFunction>& fresh,
                    const std::vector<Variable>& variables, double cost) {
   for (const SmoothFunction& f : fresh) {
@@ -58,32 +80,50 @@ void add_functions(GapSystem& system, Scanned& scanned, const std::vector<Smooth
         std::any_of(scanned.functions.begin(), scanned.functions.end(), [&](const SmoothFunction& o) {
           return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad;
         });
-    if (there) continue;
-    std::vector<const Variable*> which;
-    std::vector<Eigen::VectorXd> at;
-    for (const std::size_t v : f.of) {
-      which.push_back(&variables[v]);
-      at.push_back(variables[v].value);
-    }
-    const Eigen::MatrixXd phi = members(which, at);
-    const Eigen::VectorXd& place = place_column(system, f.place).column;
-    Eigen::MatrixXd columns(place.size(), phi.cols());
-    for (Eigen::Index k = 0; k < phi.cols(); ++k) columns.col(k) = times(place, f.size_rad * phi.col(k));
-    Block block;
-    block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
-    block.precision = 1;
-    block.parameters = cost;  // of having tried so many functions
-    block.margin = margin;
-    block.function_joint = f.place.body;
-    for (const Variable* v : which) {
-      if (v->is_order) continue;
-      if (v->kind == Covariate::reading) block.function_readings.push_back(v->joint);
-      if (v->kind == Covariate::payload) block.function_load = true;
-    }
-    block.scanned = scanned.functions.size();
-    scanned.functions.push_back(f);
-    add_block(system, block, columns);
+    if (!there) add_function(system, scanned, f, variables, cost);
   }
+}
+
+/// Of the functions that were chosen, only the members that matter, and finer ones where they do: names are decided, now
+/// it is prediction that counts.
+Scored with_relevant_members(GapSystem& system, SubsetSearch& search, Scanned& scanned, Scored best,
+                             const std::vector<Variable>& variables) {
+  const Subset chosen = best.blocks;
+  for (const std::size_t b : chosen) {
+    if (system.blocks[b].id.effect != Effect::unnamed) continue;
+    Subset others;
+    for (const std::size_t o : best.blocks) {
+      if (o != b) others.push_back(o);
+    }
+    const double cost = system.blocks[b].parameters;
+    std::optional<SmoothFunction> finest;
+    double most = -std::numeric_limits<double>::infinity();
+    for (const int harmonics : {2, 4}) {
+      SmoothFunction f = scanned.functions[system.blocks[b].scanned];
+      f.harmonics = harmonics;
+      const std::size_t had = system.blocks.size();
+      add_function(system, scanned, f, variables, cost);
+      if (system.blocks.size() == had) continue;
+      search.extend();
+      const Block& whole = system.blocks.back();
+      if (static_cast<Eigen::Index>(whole.columns.size()) != members(f, variables).cols()) continue;
+      const auto [information, right] = search.given(others, had);
+      double gain = 0;
+      f.share = relevance(information, right, gain);
+      if (!(gain > most)) continue;
+      most = gain;
+      finest = f;
+    }
+    if (!finest) continue;
+    const std::size_t had = system.blocks.size();
+    add_function(system, scanned, *finest, variables, cost);
+    if (system.blocks.size() == had) continue;
+    search.extend();
+    others.push_back(had);
+    const Scored with = search.score(others);
+    if (with.gain > best.gain) best = with;
+  }
+  return best;
 }
 
 void add_slips(GapSystem& system, const std::vector<Slip>& found, const std::vector<Observation>& rows,
@@ -259,6 +299,7 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   }
 
   best = only_what_predicts(search, std::move(best));
+  best = with_relevant_members(system, search, scanned, std::move(best), variables_);
   out.solution = best;
   Eigen::Index from = 0;
   for (const std::size_t b : best.blocks) {

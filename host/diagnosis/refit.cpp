@@ -1,6 +1,8 @@
 #include "diagnosis/refit.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -32,6 +34,29 @@ bool is_free(const CurveParts& parts, std::size_t coefficient) {
   });
 }
 
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Fine positions along one side of a grid, and the node values of the broken line that comes closest to values there.
+struct Between {
+  explicit Between(const std::vector<double>& nodes) {
+    constexpr Eigen::Index steps = 8;
+    const Eigen::Index cells = static_cast<Eigen::Index>(nodes.size()) - 1;
+    at.resize(cells * steps + 1);
+    Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(at.size(), cells + 1);
+    for (Eigen::Index k = 0; k < at.size(); ++k) {
+      const Eigen::Index cell = std::min(k / steps, cells - 1);
+      const double share = static_cast<double>(k - cell * steps) / steps;
+      const auto from = static_cast<std::size_t>(cell);
+      at[k] = nodes[from] + share * (nodes[from + 1] - nodes[from]);
+      hats(k, cell) = 1 - share;
+      hats(k, cell + 1) = share;
+    }
+    nearest = (hats.transpose() * hats).llt().solve(hats.transpose());
+  }
+  Eigen::VectorXd at;
+  Eigen::MatrixXd nearest;  ///< node values = nearest * values
+};
+
 /// The smooth function as a table that the core reads: its values at nodes of two variables.
 void add_table_of(const Piece& piece, const Explanation& found, const RobotFile& robot,
                   ParametricModel& model) {
@@ -60,21 +85,24 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
   const Term<double>& term = model.set.terms.back();
   double* values =
       model.set.values.data() + model.set.tables[term.table].offset + id.node[0].size() + id.node[1].size();
-  const std::size_t rows = id.node[0].size();
-  const std::size_t columns = id.node[1].size();
-  std::vector<Eigen::VectorXd> at(of.size(), Eigen::VectorXd(static_cast<Eigen::Index>(rows * columns)));
-  for (std::size_t r = 0; r < rows; ++r) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const Eigen::Index cell = static_cast<Eigen::Index>(r * columns + c);
-      at[0][cell] = id.node[0][r];
-      if (at.size() > 1) at[1][cell] = id.node[1][c];
+  // Not the function's values at the nodes, but those whose straight lines between them come closest to it.
+  const std::array<Between, 2> between{Between(id.node[0]), Between(id.node[1])};
+  const Eigen::Index rows = between[0].at.size();
+  const Eigen::Index columns = between[1].at.size();
+  std::vector<Eigen::VectorXd> at(of.size(), Eigen::VectorXd(rows * columns));
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      at[0][r * columns + c] = between[0].at[r];
+      if (at.size() > 1) at[1][r * columns + c] = between[1].at[c];
     }
   }
-  const Eigen::MatrixXd phi = members(of, at);
+  const Eigen::MatrixXd phi = members(*piece.function, found.variables, at);
   // Columns that the projection took away have no coefficient: then the numbers differ, and the function is as it was.
   if (phi.cols() != piece.value.size()) return;
   const Eigen::VectorXd v = phi * piece.value;
-  for (Eigen::Index k = 0; k < v.size(); ++k) values[k] = v[k];
+  const Eigen::Map<const RowMajor> fine(v.data(), rows, columns);
+  const RowMajor coarse = between[0].nearest * fine * between[1].nearest.transpose();
+  for (Eigen::Index k = 0; k < coarse.size(); ++k) values[k] = coarse.data()[k];
 }
 
 /// Turns a curve's mean over the readings that occur into the offset of its joint: the pose stays what it is.

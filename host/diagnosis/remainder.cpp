@@ -280,17 +280,64 @@ Eigen::MatrixXd members_of_one(const Variable& range, const Eigen::VectorXd& at,
 
 }  // namespace
 
-Eigen::MatrixXd members(const std::vector<const Variable*>& of, const std::vector<Eigen::VectorXd>& at) {
-  if (of.size() == 1) return members_of_one(*of[0], at[0], 4);
-  const Eigen::MatrixXd a = members_of_one(*of[0], at[0], 2);
-  const Eigen::MatrixXd b = members_of_one(*of[1], at[1], 2);
-  Eigen::MatrixXd all(a.rows(), a.cols() + b.cols() + a.cols() * b.cols());
-  all << a, b, Eigen::MatrixXd(a.rows(), a.cols() * b.cols());
-  for (Eigen::Index i = 0; i < a.cols(); ++i) {
-    for (Eigen::Index k = 0; k < b.cols(); ++k)
-      all.col(a.cols() + b.cols() + i * b.cols() + k) = a.col(i).cwiseProduct(b.col(k));
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables,
+                        const std::vector<Eigen::VectorXd>& at) {
+  const Variable& first = variables[function.of[0]];
+  Eigen::MatrixXd all;
+  if (function.of.size() == 1) {
+    all = members_of_one(first, at[0], 2 * function.harmonics);
+  } else {
+    const Eigen::MatrixXd a = members_of_one(first, at[0], function.harmonics);
+    const Eigen::MatrixXd b = members_of_one(variables[function.of[1]], at[1], function.harmonics);
+    all.resize(a.rows(), a.cols() + b.cols() + a.cols() * b.cols());
+    all << a, b, Eigen::MatrixXd(a.rows(), a.cols() * b.cols());
+    for (Eigen::Index i = 0; i < a.cols(); ++i) {
+      for (Eigen::Index k = 0; k < b.cols(); ++k)
+        all.col(a.cols() + b.cols() + i * b.cols() + k) = a.col(i).cwiseProduct(b.col(k));
+    }
   }
-  return all;
+  if (function.share.size() == 0) return all;
+  std::vector<Eigen::Index> stay;
+  for (Eigen::Index k = 0; k < all.cols(); ++k) {
+    if (function.share[k] > 0) stay.push_back(k);
+  }
+  return all(Eigen::all, stay) * function.share(stay).asDiagonal();
+}
+
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables) {
+  std::vector<Eigen::VectorXd> at;
+  for (const std::size_t v : function.of) at.push_back(variables[v].value);
+  return members(function, variables, at);
+}
+
+Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain) {
+  constexpr int rounds = 100;
+  constexpr double gone = 1e-8;
+  const Eigen::Index n = right.size();
+  Eigen::VectorXd variance = Eigen::VectorXd::Ones(n);
+  Eigen::VectorXd determined = Eigen::VectorXd::Zero(n);
+  gain = 0;
+  for (int round = 0; round <= rounds; ++round) {
+    // In members of which each has the prior 1: never singular.
+    const Eigen::VectorXd size = variance.cwiseSqrt();
+    Eigen::MatrixXd normal = size.asDiagonal() * information * size.asDiagonal();
+    normal.diagonal().array() += 1;
+    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+    if (factor.info() != Eigen::Success) break;
+    const Eigen::VectorXd scaled = size.asDiagonal() * right;
+    const Eigen::VectorXd mean = factor.solve(scaled);
+    const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(n, n));
+    determined = 1 - covariance.diagonal().array();
+    gain = mean.dot(scaled) - 2 * factor.matrixLLT().diagonal().array().log().sum() -
+           2 * static_cast<double>((variance.array() > gone).count());
+    if (round == rounds) break;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double square = mean[k] * mean[k];
+      variance[k] *= variance[k] > gone && square > 0 ? square / std::max(determined[k], 1e-12) : 0;
+      variance[k] = variance[k] > gone ? std::min(variance[k], 1e4) : 0;
+    }
+  }
+  return variance.cwiseSqrt();
 }
 
 std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Remainder& left,
@@ -313,13 +360,9 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
   }
   std::vector<SmoothFunction> all;
   for (const std::vector<std::size_t>& set : sets) {
-    std::vector<const Variable*> which;
-    std::vector<Eigen::VectorXd> at;
-    for (const std::size_t v : set) {
-      which.push_back(&of[v]);
-      at.push_back(of[v].value);
-    }
-    const Eigen::MatrixXd phi = members(which, at);
+    SmoothFunction kind;
+    kind.of = set;
+    const Eigen::MatrixXd phi = members(kind, of);
     for (unsigned j = 1; j <= joint_count; ++j) {
       // A coupling of the direction of one joint to another is nobody's.
       if (set.size() == 1 && of[set[0]].kind == Covariate::direction && of[set[0]].joint == j) continue;
@@ -329,9 +372,8 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
       const Eigen::VectorXd b = phi.transpose() * s.product / left.noise_scale2;
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
       const Eigen::VectorXd along = eigen.eigenvectors().transpose() * b;
-      SmoothFunction f;
+      SmoothFunction f = kind;
       f.place = {static_cast<std::uint8_t>(j), slot::theta};
-      f.of = set;
       f.gain = -1e300;
       for (const double size : sizes) {
         double gain = -tried;
