@@ -146,8 +146,8 @@ double price(const Answer& answer) {
   const double scale2 = search.noise_scale2();
   const Remainder left = remainder(search, s);
   const auto masked = static_cast<double>(std::count(system.counts.begin(), system.counts.end(), false));
-  return left.residual.squaredNorm() / scale2 + system.numbers * std::log(scale2) +
-         (s.chi2_gain - s.gain) + search.margins(s.blocks) + masked * outlier_price;
+  return left.residual.squaredNorm() / scale2 + system.numbers * std::log(scale2) + (s.chi2_gain - s.gain) +
+         search.margins(s.blocks) + masked * outlier_price;
 }
 
 /// What is left over after the names may be a place that moves from pose to pose. Then the numbers of a row are not
@@ -169,8 +169,8 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
   // The scatter was that of everything at first: what was named is no scatter, and less scatter lets more be named.
   double size = scattered.log_determinant;
   for (int round = 0; round < 3 && !other.found.pieces.empty(); ++round) {
-    ScatteredModel less = scattered_model(robot, rows, other.refit.fit.estimate, other.refit.fitted,
-                                          other.refit.fit.weight);
+    ScatteredModel less =
+        scattered_model(robot, rows, other.refit.fit.estimate, other.refit.fitted, other.refit.fit.weight);
     if (less.places.empty() || less.log_determinant > 0.95 * size) break;
     EstimatorOptions options;
     options.spectrum = false;
@@ -179,8 +179,8 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
     scattered = std::move(less);
     other = under();
   }
-  const double cost = scattered.log_determinant + static_cast<double>(scattered.places.size()) *
-                                                      answer.found.search->log_n();
+  const double cost =
+      scattered.log_determinant + static_cast<double>(scattered.places.size()) * answer.found.search->log_n();
   if (price(other) + cost >= price(answer)) return;
   const Scatter& most = scattered.places.front();
   Misfit m;
@@ -403,16 +403,15 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
         fmt::format("{} of {} rows are outliers and do not count in full", out.outliers.size(), rows.size()));
 
   tell("poses that tell rivals apart", 0.9);
-  out.telling_poses = telling_poses(robot, *answer.rows, answer.start.fit.estimate, answer.start.fitted, explainer.candidate_set(),
-                                    found, out.effects, options.seed);
+  out.telling_poses = telling_poses(robot, *answer.rows, answer.start.fit.estimate, answer.start.fitted,
+                                    explainer.candidate_set(), found, out.effects, options.seed);
 
   if (!refit.fit.converged)
     out.doubts.push_back(
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
   const bool changed = !out.effects.empty() || unnamed;
-  if (changed &&
-      !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
+  if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))
     out.doubts.push_back("the error after is not below the error before");
   if (out.verdict != Verdict::unnamed && refit.fit.degrees_of_freedom >= 1 &&

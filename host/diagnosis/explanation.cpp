@@ -18,6 +18,8 @@ namespace {
 constexpr double margin = least_gain;
 constexpr std::size_t most_effects = 8;
 
+bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
+
 Block local_block(const LocalCurve& c, std::size_t index) {
   Block block;
   block.id = EffectId{.effect = Effect::joint_curve, .joint = c.joint, .coefficients = c.knots};
@@ -59,12 +61,12 @@ void add_function(GapSystem& system, Scanned& scanned, const SmoothFunction& f,
   for (Eigen::Index k = 0; k < phi.cols(); ++k) columns.col(k) = times(place, f.size_rad * phi.col(k));
   Block block;
   block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
-  block.precision = 1;
-  block.parameters = cost;  // of having tried so many functions
+  block.precision = f.bump ? 0 : 1;
+  block.parameters = f.bump ? 4 : cost;  // of having tried so many functions
   block.margin = margin;
   block.function_joint = f.place.body;
   for (const std::size_t v : f.of) {
-    if (variables[v].is_order) continue;
+    if (variables[v].is_order || f.bump) continue;
     if (variables[v].kind == Covariate::reading) block.function_readings.push_back(variables[v].joint);
     if (variables[v].kind == Covariate::payload) block.function_load = true;
   }
@@ -78,7 +80,7 @@ void add_functions(GapSystem& system, Scanned& scanned, const std::vector<Smooth
   for (const SmoothFunction& f : fresh) {
     const bool there =
         std::any_of(scanned.functions.begin(), scanned.functions.end(), [&](const SmoothFunction& o) {
-          return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad;
+          return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad && !o.bump && !f.bump;
         });
     if (!there) add_function(system, scanned, f, variables, cost);
   }
@@ -90,7 +92,7 @@ Scored with_relevant_members(GapSystem& system, SubsetSearch& search, Scanned& s
                              const std::vector<Variable>& variables) {
   const Subset chosen = best.blocks;
   for (const std::size_t b : chosen) {
-    if (system.blocks[b].id.effect != Effect::unnamed) continue;
+    if (!is_function(system.blocks[b]) || scanned.functions[system.blocks[b].scanned].bump) continue;
     Subset others;
     for (const std::size_t o : best.blocks) {
       if (o != b) others.push_back(o);
@@ -167,8 +169,6 @@ std::vector<bool> in_full(const std::vector<double>& weight) {
   for (const double w : weight) out.push_back(w >= 1);
   return out;
 }
-
-bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
 
 }  // namespace
 
@@ -286,6 +286,14 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   const std::vector<SmoothFunction> after_names =
       smooth_functions(system, remainder(search, best), variables_, 2);
   functions.insert(functions.end(), after_names.begin(), after_names.end());
+  if (rows_.size() <= 300) {  // of many rows the smooth functions do
+    for (const Subset& names : {Subset(), best.blocks}) {
+      const std::vector<SmoothFunction> found =
+          bumps(system, remainder(search, search.score(names)), variables_, 2);
+      functions.insert(functions.end(), found.begin(), found.end());
+      if (best.blocks.empty()) break;
+    }
+  }
   functions.erase(std::remove_if(functions.begin(), functions.end(),
                                  [](const SmoothFunction& f) { return f.gain < margin; }),
                   functions.end());
@@ -368,6 +376,8 @@ void Explainer::judge(Explanation& found) const {
     for (const std::size_t v : piece.function->of) {
       m.covariates.push_back(found.variables[v].name());
       m.around_deg.emplace_back();
+      if (piece.function->bump)
+        m.around_deg.back() = degrees(piece.function->bump->centre_rad[m.covariates.size() - 1]);
     }
     Subset without;
     for (std::size_t k = 0; k < found.solution.blocks.size(); ++k) {

@@ -57,6 +57,22 @@ struct Between {
   Eigen::MatrixXd nearest;  ///< node values = nearest * values
 };
 
+/// Nodes close together where a bump is, in every turn between low and high.
+std::vector<double> nodes_of(const Bump& bump, std::size_t side, double low, double high) {
+  std::vector<double> nodes{low, high};
+  const double first = bump.centre_rad[side] + 2 * pi * std::floor((low - bump.centre_rad[side]) / (2 * pi));
+  for (double centre = first; centre < high + 2 * pi; centre += 2 * pi) {
+    for (int k = -4; k <= 4; ++k) {
+      const double at = centre + 0.5 * bump.spacing_rad * k;
+      if (at > low && at < high) nodes.push_back(at);
+    }
+  }
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end(), [](double a, double b) { return b - a < 1e-6; }),
+              nodes.end());
+  return nodes;
+}
+
 /// The smooth function as a table that the core reads: its values at nodes of two variables.
 void add_table_of(const Piece& piece, const Explanation& found, const RobotFile& robot,
                   ParametricModel& model) {
@@ -73,6 +89,10 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
       const double low = of[side]->value.minCoeff();
       const double high = of[side]->value.maxCoeff();
       const std::size_t count = of[side]->kind == Covariate::reading ? nodes : 5;
+      if (piece.function->bump) {
+        id.node[side] = nodes_of(*piece.function->bump, side, low, high);
+        continue;
+      }
       for (std::size_t k = 0; k < count; ++k)
         id.node[side].push_back(low + (high - low) * static_cast<double>(k) / static_cast<double>(count - 1));
     } else {

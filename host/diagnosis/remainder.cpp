@@ -41,6 +41,12 @@ double spline(double x) {
 
 double turn_apart(double a, double b) { return std::remainder(a - b, 2 * pi); }
 
+double value_of(const Bump& bump, double x, double y) {
+  // 1 in the middle: 9/4 times the product of two splines of 2/3.
+  return 2.25 * spline(turn_apart(x, bump.centre_rad[0]) / bump.spacing_rad) *
+         spline(turn_apart(y, bump.centre_rad[1]) / bump.spacing_rad);
+}
+
 }  // namespace
 
 Remainder remainder(const SubsetSearch& search, const Scored& solution) {
@@ -284,7 +290,10 @@ Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variab
                         const std::vector<Eigen::VectorXd>& at) {
   const Variable& first = variables[function.of[0]];
   Eigen::MatrixXd all;
-  if (function.of.size() == 1) {
+  if (function.bump) {
+    all.resize(at[0].size(), 1);
+    for (Eigen::Index k = 0; k < all.rows(); ++k) all(k, 0) = value_of(*function.bump, at[0][k], at[1][k]);
+  } else if (function.of.size() == 1) {
     all = members_of_one(first, at[0], 2 * function.harmonics);
   } else {
     const Eigen::MatrixXd a = members_of_one(first, at[0], function.harmonics);
@@ -308,6 +317,142 @@ Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variab
   std::vector<Eigen::VectorXd> at;
   for (const std::size_t v : function.of) at.push_back(variables[v].value);
   return members(function, variables, at);
+}
+
+namespace {
+
+/// Rows that a spline touches, and its value there.
+using Touched = std::vector<std::pair<Eigen::Index, double>>;
+
+Touched touched_by(const Eigen::VectorXd& x, double centre, double spacing) {
+  Touched out;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double value = 1.5 * spline(turn_apart(x[k], centre) / spacing);
+    if (value > 0) out.emplace_back(k, value);
+  }
+  return out;
+}
+
+/// What a bump of a joint would take from chi-square less what its four numbers cost; none where it is not above `least`.
+/// \param y  value of the second spline at every row
+std::optional<double> gain_above(double least, const Scalar& s, const Touched& x, const Eigen::VectorXd& y,
+                                 double noise_scale2, double log_n) {
+  double b = 0;
+  double square = 0;
+  std::size_t touched = 0;
+  for (const auto& [k, value] : x) {
+    const double phi = value * y[k];
+    if (phi <= 0 || !(s.square[k] > 0)) continue;
+    b += phi * s.product[k];
+    square += phi * phi * s.square[k];
+    if (phi > 0.05) ++touched;
+  }
+  // Two poses would do for a line. What the rest of the model takes of a bump is seldom more than half.
+  if (touched < 4 || !(b * b / (0.4 * square) / noise_scale2 - 4 * log_n > least)) return {};
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(s.basis.rows());
+  for (const auto& [k, value] : x) {
+    if (y[k] > 0 && s.square[k] > 0) w += value * y[k] * s.basis.col(k);
+  }
+  const double norm = square - w.squaredNorm();
+  if (!(norm > 0.05 * square)) return {};
+  const double gain = b * b / norm / noise_scale2 - 4 * log_n;
+  if (!(gain > least)) return {};
+  return gain;
+}
+
+Eigen::VectorXd at_every_row(const Touched& touched, Eigen::Index rows) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(rows);
+  for (const auto& [k, value] : touched) out[k] = value;
+  return out;
+}
+
+/// Splines of one reading side by side over the turn.
+struct Row {
+  std::vector<double> centre_rad;
+  std::vector<Touched> touched;
+  std::vector<Eigen::VectorXd> value;
+  Row(const Eigen::VectorXd& x, double spacing) {
+    const int count = static_cast<int>(std::ceil(4 * pi / spacing));
+    for (int c = 0; c < count; ++c) {
+      centre_rad.push_back(-pi + 2 * pi * c / count);
+      touched.push_back(touched_by(x, centre_rad.back(), spacing));
+      value.push_back(at_every_row(touched.back(), x.size()));
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<SmoothFunction> bumps(const GapSystem& system, const Remainder& left,
+                                  const std::vector<Variable>& of, std::size_t most) {
+  constexpr std::array<double, 3> spacings{0.5, 0.8, 1.2};
+  const double log_n = std::log(std::max(2.0, system.numbers));
+  std::vector<Scalar> joints;
+  for (unsigned j = 1; j <= joint_count; ++j) {
+    joints.push_back(
+        scalar(system, left, place_column(system, {static_cast<std::uint8_t>(j), slot::theta}).column));
+  }
+  std::vector<std::vector<Row>> rows_of(of.size());
+  for (std::size_t v = 0; v < of.size(); ++v) {
+    if (of[v].is_order || of[v].kind != Covariate::reading) continue;
+    for (const double spacing : spacings) rows_of[v].emplace_back(of[v].value, spacing);
+  }
+  std::vector<SmoothFunction> all;
+  for (std::size_t a = 0; a < of.size(); ++a) {
+    for (std::size_t b = a + 1; b < of.size(); ++b) {
+      if (of[a].is_order || of[b].is_order || of[a].kind != Covariate::reading ||
+          of[b].kind != Covariate::reading)
+        continue;
+      for (unsigned j = 1; j <= joint_count; ++j) {
+        SmoothFunction best;
+        best.place = {static_cast<std::uint8_t>(j), slot::theta};
+        best.of = {a, b};
+        best.size_rad = 1e-4;
+        best.gain = 0;
+        const Scalar& joint = joints[j - 1];
+        for (std::size_t w = 0; w < spacings.size(); ++w) {
+          const Row& first = rows_of[a][w];
+          const Row& second = rows_of[b][w];
+          for (std::size_t x = 0; x < first.touched.size(); ++x) {
+            for (std::size_t y = 0; y < second.value.size(); ++y) {
+              const auto gain =
+                  gain_above(best.gain, joint, first.touched[x], second.value[y], left.noise_scale2, log_n);
+              if (!gain) continue;
+              best.gain = *gain;
+              best.bump = Bump{{first.centre_rad[x], second.centre_rad[y]}, spacings[w]};
+            }
+          }
+        }
+        // Place and width more closely.
+        double step = 0.25;
+        for (int round = 0; best.bump && round < 5; ++round, step /= 2) {
+          const Bump from = *best.bump;
+          for (const double dx : {-step, 0.0, step}) {
+            for (const double dy : {-step, 0.0, step}) {
+              for (const double wider : {1 - step, 1.0, 1 + step}) {
+                const Bump bump{
+                    {from.centre_rad[0] + dx * from.spacing_rad, from.centre_rad[1] + dy * from.spacing_rad},
+                    from.spacing_rad * wider};
+                const auto gain = gain_above(
+                    best.gain, joint, touched_by(of[a].value, bump.centre_rad[0], bump.spacing_rad),
+                    at_every_row(touched_by(of[b].value, bump.centre_rad[1], bump.spacing_rad),
+                                 of[b].value.size()),
+                    left.noise_scale2, log_n);
+                if (!gain) continue;
+                best.gain = *gain;
+                best.bump = bump;
+              }
+            }
+          }
+        }
+        if (best.bump) all.push_back(best);
+      }
+    }
+  }
+  std::sort(all.begin(), all.end(),
+            [](const SmoothFunction& x, const SmoothFunction& y) { return x.gain > y.gain; });
+  if (all.size() > most) all.resize(most);
+  return all;
 }
 
 Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain) {

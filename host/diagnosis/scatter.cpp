@@ -98,8 +98,9 @@ class Narrowing {
 
 }  // namespace
 
-ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
-                               const Unknowns& fitted, const std::vector<double>& weight) {
+ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows,
+                               const Estimate& start, const Unknowns& fitted,
+                               const std::vector<double>& weight) {
   ScatteredModel out;
   Estimate estimate = start;
   std::vector<double> weights = weight;
@@ -126,7 +127,8 @@ ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observa
       for (const PlaceColumn& p : places) {
         const Scatter s = best_scatter(p.place, p.column, residual, speaks);
         // Where the rows do not tell them apart it is a joint: joints are what moves.
-        if (!(s.gain > 0) || !(s.gain + bonus(p.place) > best.gain + (which == nullptr ? 0 : bonus(which->place))))
+        if (!(s.gain > 0) ||
+            !(s.gain + bonus(p.place) > best.gain + (which == nullptr ? 0 : bonus(which->place))))
           continue;
         best = s;
         which = &p;
@@ -134,7 +136,8 @@ ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observa
       if (which == nullptr || !(best.gain > std::log(system.numbers) + margin)) break;
       const Narrowing narrow(which->column, best.sigma);
       for (std::size_t k = 0; k < rows.size(); ++k) {
-        out.log_determinant += std::log1p(best.sigma * best.sigma * which->column.segment<6>(at(k)).squaredNorm());
+        out.log_determinant +=
+            std::log1p(best.sigma * best.sigma * which->column.segment<6>(at(k)).squaredNorm());
         out.rows[k].whitening = narrow.matrix(k) * out.rows[k].whitening;
       }
       narrow.apply(residual);

@@ -22,16 +22,17 @@ struct Scatter {
 
 /// A model whose noise is the declared one and the scatter of these places besides.
 struct ScatteredModel {
-  std::vector<Scatter> places;     ///< largest gain first; empty: nothing scatters
-  std::vector<Observation> rows;   ///< with the wider noise in their whitening
-  double log_determinant = 0;      ///< of the wider noise over the declared one, all rows
-  Fit fit;                         ///< to these rows
+  std::vector<Scatter> places;    ///< largest gain first; empty: nothing scatters
+  std::vector<Observation> rows;  ///< with the wider noise in their whitening
+  double log_determinant = 0;     ///< of the wider noise over the declared one, all rows
+  Fit fit;                        ///< to these rows
 };
 
 /// Maximum likelihood, place after place, in turns with the parameters.
 /// \param fitted  what the rows move, beginning at `start`; rows of `weight` below 1 do not speak of the scatter
-ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
-                               const Unknowns& fitted, const std::vector<double>& weight);
+ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows,
+                               const Estimate& start, const Unknowns& fitted,
+                               const std::vector<double>& weight);
 
 }  // namespace flexcomp::host
 

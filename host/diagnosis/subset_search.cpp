@@ -229,7 +229,8 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
   return gains;
 }
 
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& others, std::size_t block) const {
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& others,
+                                                                std::size_t block) const {
   std::vector<Eigen::Index> index;
   std::vector<double> prior;
   for (const std::size_t b : others) {
@@ -243,7 +244,8 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& ot
   Eigen::VectorXd right = product_(own);
   if (index.empty()) return {information, right};
   Eigen::MatrixXd normal = gram_(index, index);
-  normal.diagonal() += Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
+  normal.diagonal() +=
+      Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
   Eigen::MatrixXd across = gram_(index, own);
   Eigen::MatrixXd done = product_(index);
   if (!factor_in_place(normal)) return {information, right};
