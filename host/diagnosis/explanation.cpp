@@ -66,7 +66,9 @@ void add_function(GapSystem& system, Scanned& scanned, const SmoothFunction& f,
   block.margin = margin;
   block.function_joint = f.place.body;
   for (const std::size_t v : f.of) {
-    if (variables[v].is_order || f.bump) continue;
+    if (variables[v].is_order) continue;
+    // A bump contains nothing, but what is left of its own joint's curve looks like one.
+    if (f.bump && variables[v].joint != f.place.body) continue;
     if (variables[v].kind == Covariate::reading) block.function_readings.push_back(variables[v].joint);
     if (variables[v].kind == Covariate::payload) block.function_load = true;
   }
@@ -343,6 +345,8 @@ Scored Explainer::only_what_predicts(const SubsetSearch& search, Scored best) co
     std::optional<std::size_t> idle;
     Scored without_it;
     for (const std::size_t b : best.blocks) {
+      // Of the few poses in a local fault each one left out takes most of it away.
+      if (blocks[b].width_rad > 0) continue;
       Subset without;
       for (const std::size_t other : best.blocks) {
         if (other != b && (is_function(blocks[b]) || !same_name(blocks[other].id, blocks[b].id)))
