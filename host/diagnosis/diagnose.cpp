@@ -75,13 +75,6 @@ double declared_chi2(const std::vector<double>& weight, const std::vector<RowRes
   return sum;
 }
 
-Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
-  if (row.has_orientation) return row.whitening.partialPivLu().solve(whitened);
-  Vector6<double> e = Vector6<double>::Zero();
-  e.head<3>() = row.whitening.topLeftCorner<3, 3>().partialPivLu().solve(whitened.head<3>());
-  return e;
-}
-
 /// What was found in rows with this noise, and all that it stands on.
 struct Answer {
   std::unique_ptr<const std::vector<Observation>> rows;
@@ -352,7 +345,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
     effect.pushed = !is_measurement_effect(effect.id.effect);
     effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
-    describe(effect, refit, robot, rows);
+    describe(effect, refit, robot, *answer.rows, system.nuisance);
     out.effects.push_back(std::move(effect));
   }
   std::stable_sort(out.effects.begin(), out.effects.end(),

@@ -243,7 +243,7 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
 }
 
 void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
-              const std::vector<Observation>& rows) {
+              const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance) {
   const TermSet& set = refit.fit.estimate.set;
   for (EffectGroup& group : effects_of(set, robot.nominal)) {
     if (!same_name(group.id, effect.id)) continue;
@@ -267,8 +267,17 @@ void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
     const auto without_model = prepare(without.set, robot, "diagnosis");
     const std::vector<RowResidual> a = residuals(refit.fit.estimate, *with_model, rows);
     const std::vector<RowResidual> b = residuals(without, *without_model, rows);
+    Eigen::VectorXd shift(6 * static_cast<Eigen::Index>(rows.size()));
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      const double moved = (a[k].position_m - b[k].position_m).norm();
+      Vector6<double> e;
+      e << a[k].position_m - b[k].position_m, a[k].orientation_rad - b[k].orientation_rad;
+      shift.segment<6>(6 * static_cast<Eigen::Index>(k)) = rows[k].whitening * e;
+    }
+    // What geometry and frames would take up is theirs: an axis that tilts once a turn is largely a tilted base.
+    shift -= nuisance * (nuisance.transpose() * shift);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double moved =
+          unwhitened(rows[k], shift.segment<6>(6 * static_cast<Eigen::Index>(k))).head<3>().norm();
       effect.largest_m = std::max(effect.largest_m, moved);
       effect.rms_m += moved * moved / static_cast<double>(rows.size());
     }
