@@ -148,8 +148,9 @@ double price(const Answer& answer) {
 /// the better of the two answers stands.
 void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Observation>& rows,
                     const Start& at_first, const ContextColumns& columns, const Tell& tell) {
-  const double left_over = answer.found.search->noise_scale2();
-  if (rows.size() > 300 && left_over < 1.1) return;
+  // Many rows bear a little scatter without taking it for structure, and each answer takes its time.
+  const bool many = rows.size() > 300;
+  if (many && answer.found.search->noise_scale2() < 1.5) return;
   tell("what moves from pose to pose", 0.6);
   ScatteredModel scattered =
       scattered_model(robot, rows, at_first.fit.estimate, at_first.fitted, at_first.fit.weight);
@@ -161,7 +162,7 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
   Answer other = under();
   // The scatter was that of everything at first: what was named is no scatter, and less scatter lets more be named.
   double size = scattered.log_determinant;
-  for (int round = 0; round < 3 && !other.found.pieces.empty(); ++round) {
+  for (int round = 0; round < (many ? 1 : 3) && !other.found.pieces.empty(); ++round) {
     ScatteredModel less =
         scattered_model(robot, rows, other.refit.fit.estimate, other.refit.fitted, other.refit.fit.weight);
     if (less.places.empty() || less.log_determinant > 0.95 * size) break;
