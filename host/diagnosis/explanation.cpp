@@ -18,6 +18,10 @@ namespace {
 constexpr double margin = least_gain;
 constexpr std::size_t most_effects = 8;
 
+/// Splines per turn of a local fault of any shape, and how large its coefficients are.
+constexpr std::size_t finest_local = 96;
+constexpr double deep_fault_rad = 5e-4;
+
 bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
 
 Block local_block(const LocalCurve& c, std::size_t index) {
@@ -48,8 +52,21 @@ void add_locals(GapSystem& system, Scanned& scanned, const std::vector<LocalCurv
     const PlaceColumn& place = place_column(system, {static_cast<std::uint8_t>(c.joint), slot::theta});
     scanned.locals.push_back(c);
     // In the unit of curves' coefficients, 1e-4 rad.
-    add_block(system, local_block(c, scanned.locals.size() - 1),
-              times(place.column, 1e-4 * local_values(c, rows)));
+    Block block = local_block(c, scanned.locals.size() - 1);
+    add_block(system, block, times(place.column, 1e-4 * local_values(c, rows)));
+    // And of any shape: a fault is no spline, and what one spline leaves of a deep one would look like something else.
+    std::vector<Eigen::VectorXd> splines;
+    for (std::size_t k = 0; k < finest_local; ++k) {
+      const LocalCurve part{c.joint, finest_local, 2 * pi * static_cast<double>(k) / finest_local, 0};
+      if (std::abs(std::remainder(part.centre_rad - c.centre_rad, 2 * pi)) < 1.5 * block.width_rad)
+        splines.push_back(local_values(part, rows));
+    }
+    Eigen::MatrixXd columns(place.column.size(), static_cast<Eigen::Index>(splines.size()));
+    for (std::size_t k = 0; k < splines.size(); ++k)
+      columns.col(static_cast<Eigen::Index>(k)) = times(place.column, 1e-4 * splines[k]);
+    block.parameters = 1;  // its place; the sizes by evidence
+    block.precision = std::pow(1e-4 / deep_fault_rad, 2);
+    add_block(system, block, columns);
   }
 }
 
