@@ -8,6 +8,10 @@ namespace flexcomp::host {
 
 namespace {
 
+/// The threaded library is needed because only that may be called from several threads; its own threads are not: the
+/// order of sums, and with it the last bits of a result, must not depend on the number of processors.
+[[maybe_unused]] const bool one_thread_each = (openblas_set_num_threads(1), true);
+
 int whole(Eigen::Index n) { return static_cast<int>(n); }
 
 void solve(const Eigen::MatrixXd& factor, Eigen::MatrixXd& b, CBLAS_SIDE side, CBLAS_TRANSPOSE transposed) {

@@ -11,9 +11,11 @@
 #include <random>
 
 #include "diagnosis/blas.hpp"
+#include "diagnosis/cross_validation.hpp"
 #include "diagnosis/explanation.hpp"
 #include "diagnosis/refit.hpp"
 #include "diagnosis/remainder.hpp"
+#include "diagnosis/scatter.hpp"
 #include "diagnosis/subset_search.hpp"
 #include "diagnosis/telling_poses.hpp"
 #include "identification/fitted_calibration.hpp"
@@ -61,46 +63,145 @@ double noise_floor(const std::vector<Observation>& rows) {
   return rows.empty() ? 0 : std::sqrt(sum / static_cast<double>(rows.size()));
 }
 
-/// Chi-square per measured number on poses that were left out, ten folds in a fixed order: the model's own parameters
-/// and the blocks are fitted to nine tenths.
-double cross_validated(const SubsetSearch& search, const Scored& solution) {
-  const GapSystem& system = search.system();
-  constexpr std::size_t folds = 10;
-  Eigen::Index count = system.nuisance.cols();
-  for (const std::size_t b : solution.blocks)
-    count += static_cast<Eigen::Index>(system.blocks[b].columns.size());
-  Eigen::MatrixXd all(system.columns.rows(), count);
-  all.leftCols(system.nuisance.cols()) = system.nuisance;
-  Eigen::VectorXd ridge = Eigen::VectorXd::Constant(count, 1e-12);
-  Eigen::Index at = system.nuisance.cols();
-  for (const std::size_t b : solution.blocks) {
-    for (const Eigen::Index c : system.blocks[b].columns) {
-      ridge[at] = search.noise_scale2() * search.precision_of(system.blocks[b], c);
-      all.col(at++) = system.columns.col(c);
-    }
-  }
-  const Eigen::MatrixXd normal = gram(all);
-  const Eigen::VectorXd right = all.transpose() * system.residual;
+/// Chi-square by the noise that was declared, of the rows that count in full.
+double declared_chi2(const std::vector<double>& weight, const std::vector<RowResidual>& residual,
+                     const std::vector<Observation>& rows) {
   double sum = 0;
-  for (std::size_t fold = 0; fold < folds; ++fold) {
-    std::vector<Eigen::Index> left_out;
-    for (std::size_t k = fold; k < system.rows; k += folds)
-      left_out.push_back(6 * static_cast<Eigen::Index>(k));
-    Eigen::MatrixXd part(6 * static_cast<Eigen::Index>(left_out.size()), count);
-    Eigen::VectorXd measured(part.rows());
-    for (std::size_t k = 0; k < left_out.size(); ++k) {
-      part.middleRows<6>(6 * static_cast<Eigen::Index>(k)) = all.middleRows<6>(left_out[k]);
-      measured.segment<6>(6 * static_cast<Eigen::Index>(k)) = system.residual.segment<6>(left_out[k]);
-    }
-    Eigen::MatrixXd reduced = normal - gram(part);
-    reduced.diagonal() += ridge;
-    Eigen::MatrixXd x = right - part.transpose() * measured;
-    if (!factor_in_place(reduced)) continue;
-    solve_lower(reduced, x);
-    solve_lower_transposed(reduced, x);
-    sum += (measured - part * x.col(0)).squaredNorm();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    Vector6<double> e;
+    e << residual[k].position_m, residual[k].orientation_rad;
+    if (weight[k] >= 1) sum += (rows[k].whitening * e).squaredNorm();
   }
-  return sum / system.numbers;
+  return sum;
+}
+
+/// What was found in rows with this noise, and all that it stands on.
+struct Answer {
+  std::unique_ptr<const std::vector<Observation>> rows;
+  Start start;
+  std::unique_ptr<const Explainer> explainer;
+  Explanation found;
+  Refit refit;
+  std::vector<PlaceShare> places, places_left;  ///< of the start, and with what was found
+};
+
+using Tell = std::function<void(const std::string&, double)>;
+
+Answer answer_for(const RobotFile& robot, const std::vector<Observation>& rows, const ContextColumns& columns,
+                  Start start, const Tell& tell, double done) {
+  Answer out;
+  out.rows = std::make_unique<const std::vector<Observation>>(rows);
+  out.start = std::move(start);
+  const Estimate& at = out.start.fit.estimate;
+  const Unknowns& fitted = out.start.fitted;
+  out.explainer =
+      std::make_unique<const Explainer>(robot, *out.rows, columns, at, fitted, out.start.fit.weight);
+  out.found = out.explainer->explain(
+      [&](double share) { tell("searching the catalogue", done + (0.6 - done) * share); });
+  tell("the model with what was found", 0.6);
+  out.refit = refit_with(robot, *out.rows, at, fitted, out.found);
+  // Where the search was linear the refit is not: once more from there, until the names stay.
+  for (int round = 0; round < 2 && !out.found.pieces.empty(); ++round) {
+    Explanation again = out.explainer->explain_again(out.refit, out.found);
+    const bool same = same_names(out.found, again);
+    out.found = std::move(again);
+    if (same) break;
+    out.refit = refit_with(robot, *out.rows, at, fitted, out.found);
+  }
+  const SubsetSearch& search = *out.found.search;
+  out.places = place_shares(*out.found.system, remainder(search, search.score({})));
+  out.places_left = place_shares(*out.found.system, remainder(search, out.found.solution));
+  return out;
+}
+
+/// Shares of a refitted model's misfit by the noise that these rows declare.
+std::vector<PlaceShare> places_left_at(const Refit& refit, const RobotFile& robot,
+                                       const std::vector<Observation>& rows) {
+  std::vector<bool> counts;
+  for (const double w : refit.fit.weight) counts.push_back(w >= 1);
+  const Estimate& at = refit.fit.estimate;
+  const GapSystem system =
+      gap_system(robot, rows, counts, at, refit.fitted, CandidateSet{at.set, {}, {}, {}, false});
+  return place_shares(system, remainder(system));
+}
+
+std::string in_words(const Scatter& s) {
+  if (place_unit(s.place).name == "mm") return fmt::format("{:.3g} mm", s.sigma * 1e3);
+  return fmt::format("{:.3g} arcsec", degrees(s.sigma) * 3600);
+}
+
+/// -2 ln of the likelihood of the misfit at the start, what the parameters of the answer cost added, against the same
+/// noise for all answers to the same rows.
+double price(const Answer& answer) {
+  const GapSystem& system = *answer.found.system;
+  const SubsetSearch& search = *answer.found.search;
+  const Scored& s = answer.found.solution;
+  const double scale2 = search.noise_scale2();
+  const Remainder left = remainder(search, s);
+  const auto masked = static_cast<double>(std::count(system.counts.begin(), system.counts.end(), false));
+  return left.residual.squaredNorm() / scale2 + system.numbers * std::log(scale2) + (s.chi2_gain - s.gain) +
+         search.margins(s.blocks) + masked * outlier_price;
+}
+
+/// What is left over after the names may be a place that moves from pose to pose. Then the numbers of a row are not
+/// independent, and names that are judged as if they were take chance for structure: judged anew under that noise, and
+/// the better of the two answers stands.
+void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Observation>& rows,
+                    const Start& at_first, const ContextColumns& columns, const Tell& tell) {
+  // Many rows bear a little scatter without taking it for structure, and each answer takes its time.
+  const bool many = rows.size() > 300;
+  if (many && answer.found.search->noise_scale2() < 1.5) return;
+  tell("what moves from pose to pose", 0.6);
+  ScatteredModel scattered =
+      scattered_model(robot, rows, at_first.fit.estimate, at_first.fitted, at_first.fit.weight);
+  if (scattered.places.empty()) return;
+  const auto under = [&] {
+    Start start{scattered.fit, at_first.fitted};
+    return answer_for(robot, scattered.rows, columns, std::move(start), tell, 0.6);
+  };
+  Answer other = under();
+  // The scatter was that of everything at first: what was named is no scatter, and less scatter lets more be named.
+  double size = scattered.log_determinant;
+  for (int round = 0; round < (many ? 1 : 3) && !other.found.pieces.empty(); ++round) {
+    ScatteredModel less =
+        scattered_model(robot, rows, other.refit.fit.estimate, other.refit.fitted, other.refit.fit.weight);
+    if (less.places.empty() || less.log_determinant > 0.95 * size) break;
+    EstimatorOptions options;
+    options.spectrum = false;
+    less.fit = fit(scattered.fit.estimate, at_first.fitted, less.rows, robot, options);
+    size = less.log_determinant;
+    scattered = std::move(less);
+    other = under();
+  }
+  const double cost =
+      scattered.log_determinant + static_cast<double>(scattered.places.size()) * answer.found.search->log_n();
+  if (price(other) + cost >= price(answer)) return;
+  const Scatter& most = scattered.places.front();
+  Misfit m;
+  m.place = most.place;
+  m.joint = m.place.body >= 1 && m.place.body <= joint_count ? m.place.body : 0;
+  m.p_value = std::exp(-0.5 * most.gain);
+  for (const PlaceShare& share : answer.places) {
+    if (share.place == m.place) m.explains = share.explains;
+  }
+  other.found.unnamed = true;
+  const bool follows = other.found.misfit && !other.found.misfit->covariates.empty();
+  if (!follows) other.found.misfit = m;
+  other.found.notes.clear();
+  for (const Scatter& s : scattered.places) {
+    other.found.notes.push_back(fmt::format(
+        "{} moves by {} (standard deviation) from pose to pose and follows nothing that was recorded",
+        place_name(s.place), in_words(s)));
+  }
+  for (const NotTestable& n : other.explainer->not_testable()) {
+    if ((n.effect != Effect::backlash && n.effect != Effect::readout_lag) || n.needs.empty()) continue;
+    if (most.place.slot == slot::theta)
+      other.found.notes.push_back(fmt::format("{} would look like this; to test it record {}",
+                                              effect_name(n.effect), fmt::join(n.needs, ", ")));
+  }
+  other.places = std::move(answer.places);
+  other.places_left = places_left_at(other.refit, robot, rows);
+  answer = std::move(other);
 }
 
 /// Probability that chance gains as much anywhere in the catalogue: poses are permuted, freely and in blocks of
@@ -191,33 +292,27 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   out.before.confounded = confounded;
   out.noise_floor_m = noise_floor(rows);
 
-  Explainer explainer(robot, rows, options.columns, start.fit.estimate, start.fitted, start.fit.weight);
+  const Start at_first = start;
+  Answer answer = answer_for(robot, rows, options.columns, std::move(start), tell, 0.1);
+  if (answer.found.unnamed) prefer_scatter(answer, robot, rows, at_first, options.columns, tell);
+  const Explainer& explainer = *answer.explainer;
+  const Explanation& found = answer.found;
+  const Refit& refit = answer.refit;
   out.not_testable = explainer.not_testable();
-  Explanation found =
-      explainer.explain([&](double share) { tell("searching the catalogue", 0.1 + 0.5 * share); });
-  tell("the model with what was found", 0.6);
-  Refit refit = refit_with(robot, rows, start.fit.estimate, start.fitted, found);
-  // Where the search was linear the refit is not: once more from there, until the names stay.
-  for (int round = 0; round < 2 && !found.pieces.empty(); ++round) {
-    Explanation again = explainer.explain_again(refit, found);
-    const bool same = same_names(found, again);
-    found = std::move(again);
-    if (same) break;
-    refit = refit_with(robot, rows, start.fit.estimate, start.fitted, found);
-  }
   tell("how sure it is", 0.7);
 
   // --- before and after -----------------------------------------------------------------------------------------
-  const auto before_model = prepare(start.fit.estimate.set, robot, source);
-  out.residuals_before = residuals(start.fit.estimate, *before_model, rows);
+  const auto before_model = prepare(at_first.fit.estimate.set, robot, source);
+  out.residuals_before = residuals(at_first.fit.estimate, *before_model, rows);
   out.error_before = statistics(out.residuals_before, rows);
-  out.chi2_per_dof_before = start.fit.chi2_per_dof();
+  out.chi2_per_dof_before = at_first.fit.chi2_per_dof();
   out.after = refit.calibration;
   out.after.confounded = confounded;
   const auto after_model = prepare(refit.fit.estimate.set, robot, source);
   out.residuals_after = residuals(refit.fit.estimate, *after_model, rows);
   out.error_after = statistics(out.residuals_after, rows);
-  out.chi2_per_dof_after = refit.fit.chi2_per_dof();
+  const double chi2_after = declared_chi2(refit.fit.weight, out.residuals_after, rows);
+  out.chi2_per_dof_after = chi2_after / std::max(1.0, refit.fit.degrees_of_freedom);
   out.degrees_of_freedom_after = refit.fit.degrees_of_freedom;
   for (std::size_t k = 0; k < refit.fit.weight.size(); ++k) {
     if (refit.fit.weight[k] < 1) out.outliers.push_back(k);
@@ -226,13 +321,13 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   // --- the search's own figures -----------------------------------------------------------------------------------
   const GapSystem& system = *found.system;
   const SubsetSearch& search = *found.search;
-  const Remainder nothing_found = remainder(search, search.score({}));
   const Remainder left = remainder(search, found.solution);
   out.dropped = system.dropped;
-  out.places = place_shares(system, nothing_found);
-  out.places_left = place_shares(system, left);
+  out.places = answer.places;
+  out.places_left = answer.places_left;
   const ChanceGains chance(search, left, options.seed);
-  const double all_cv = cross_validated(search, found.solution);
+  const LeftOutPoses left_out(rows);
+  const double all_cv = left_out.chi2_per_number(search, found.solution);
   for (const std::size_t b : found.solution.blocks) {
     if (system.blocks[b].id.effect == Effect::unnamed) continue;
     Subset without;
@@ -247,11 +342,11 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     const Scored less = search.score(without);
     effect.delta_bic = found.solution.gain - less.gain;
     effect.p_value = chance.p_value(effect.delta_bic);
-    const double cv = cross_validated(search, less);
+    const double cv = left_out.chi2_per_number(search, less);
     effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
     effect.pushed = !is_measurement_effect(effect.id.effect);
     effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
-    describe(effect, refit, robot, rows);
+    describe(effect, refit, robot, *answer.rows, system.nuisance);
     out.effects.push_back(std::move(effect));
   }
   std::stable_sort(out.effects.begin(), out.effects.end(),
@@ -265,13 +360,14 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     DiagnosisStep d;
     d.what = std::move(what);
     d.chi2_per_dof = r.residual.squaredNorm() / std::max(1.0, system.numbers - r.fitted_numbers);
-    d.cross_validated = cross_validated(search, s);
+    d.cross_validated = left_out.chi2_per_number(search, s);
     double square = 0;
     double count = 0;
     for (std::size_t k = 0; k < rows.size(); ++k) {
       if (!system.counts[k]) continue;
-      const Eigen::Matrix3d w = rows[k].whitening.topLeftCorner<3, 3>();
-      square += w.partialPivLu().solve(r.residual.segment<3>(6 * static_cast<Eigen::Index>(k))).squaredNorm();
+      square += unwhitened(answer.rows->at(k), r.residual.segment<6>(6 * static_cast<Eigen::Index>(k)))
+                    .head<3>()
+                    .squaredNorm();
       ++count;
     }
     d.train_rms_m = std::sqrt(square / std::max(1.0, count));
@@ -301,17 +397,15 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
         fmt::format("{} of {} rows are outliers and do not count in full", out.outliers.size(), rows.size()));
 
   tell("poses that tell rivals apart", 0.9);
-  out.telling_poses = telling_poses(robot, rows, start.fit.estimate, start.fitted, explainer.candidate_set(),
-                                    found, out.effects, options.seed);
+  out.telling_poses = telling_poses(robot, *answer.rows, answer.start.fit.estimate, answer.start.fitted,
+                                    explainer.candidate_set(), found, out.effects, options.seed);
 
   if (!refit.fit.converged)
     out.doubts.push_back(
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
   const bool changed = !out.effects.empty() || unnamed;
-  if (changed &&
-      !(refit.fit.chi2 / std::max(1.0, refit.fit.degrees_of_freedom) <=
-        start.fit.chi2 / std::max(1.0, start.fit.degrees_of_freedom) * 1.0001) &&
+  if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))
     out.doubts.push_back("the error after is not below the error before");
   if (out.verdict != Verdict::unnamed && refit.fit.degrees_of_freedom >= 1 &&

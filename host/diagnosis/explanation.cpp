@@ -18,9 +18,11 @@ namespace {
 constexpr double margin = least_gain;
 constexpr std::size_t most_effects = 8;
 
-/// A row that nothing explains costs this much chi-square and no more: it is then an outlier (99.9 % of the chi-square of
-/// six numbers, and what it takes to say so of one row among hundreds).
-constexpr double outlier_price = 40;
+/// Splines per turn of a local fault of any shape, and how large its coefficients are.
+constexpr std::size_t finest_local = 96;
+constexpr double deep_fault_rad = 5e-4;
+
+bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
 
 Block local_block(const LocalCurve& c, std::size_t index) {
   Block block;
@@ -50,9 +52,46 @@ void add_locals(GapSystem& system, Scanned& scanned, const std::vector<LocalCurv
     const PlaceColumn& place = place_column(system, {static_cast<std::uint8_t>(c.joint), slot::theta});
     scanned.locals.push_back(c);
     // In the unit of curves' coefficients, 1e-4 rad.
-    add_block(system, local_block(c, scanned.locals.size() - 1),
-              times(place.column, 1e-4 * local_values(c, rows)));
+    Block block = local_block(c, scanned.locals.size() - 1);
+    add_block(system, block, times(place.column, 1e-4 * local_values(c, rows)));
+    // And of any shape: a fault is no spline, and what one spline leaves of a deep one would look like something else.
+    std::vector<Eigen::VectorXd> splines;
+    for (std::size_t k = 0; k < finest_local; ++k) {
+      const LocalCurve part{c.joint, finest_local, 2 * pi * static_cast<double>(k) / finest_local, 0};
+      if (std::abs(std::remainder(part.centre_rad - c.centre_rad, 2 * pi)) < 1.5 * block.width_rad)
+        splines.push_back(local_values(part, rows));
+    }
+    Eigen::MatrixXd columns(place.column.size(), static_cast<Eigen::Index>(splines.size()));
+    for (std::size_t k = 0; k < splines.size(); ++k)
+      columns.col(static_cast<Eigen::Index>(k)) = times(place.column, 1e-4 * splines[k]);
+    block.parameters = 1;  // its place; the sizes by evidence
+    block.precision = std::pow(1e-4 / deep_fault_rad, 2);
+    add_block(system, block, columns);
   }
+}
+
+void add_function(GapSystem& system, Scanned& scanned, const SmoothFunction& f,
+                  const std::vector<Variable>& variables, double cost) {
+  const Eigen::MatrixXd phi = members(f, variables);
+  const Eigen::VectorXd& place = place_column(system, f.place).column;
+  Eigen::MatrixXd columns(place.size(), phi.cols());
+  for (Eigen::Index k = 0; k < phi.cols(); ++k) columns.col(k) = times(place, f.size_rad * phi.col(k));
+  Block block;
+  block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
+  block.precision = f.bump ? 0 : 1;
+  block.parameters = f.bump ? 4 : cost;  // of having tried so many functions
+  block.margin = margin;
+  block.function_joint = f.place.body;
+  for (const std::size_t v : f.of) {
+    if (variables[v].is_order) continue;
+    // A bump contains nothing, but what is left of its own joint's curve looks like one.
+    if (f.bump && variables[v].joint != f.place.body) continue;
+    if (variables[v].kind == Covariate::reading) block.function_readings.push_back(variables[v].joint);
+    if (variables[v].kind == Covariate::payload) block.function_load = true;
+  }
+  block.scanned = scanned.functions.size();
+  scanned.functions.push_back(f);
+  add_block(system, block, columns);
 }
 
 void add_functions(GapSystem& system, Scanned& scanned, const std::vector<SmoothFunction>& fresh,
@@ -60,34 +99,52 @@ void add_functions(GapSystem& system, Scanned& scanned, const std::vector<Smooth
   for (const SmoothFunction& f : fresh) {
     const bool there =
         std::any_of(scanned.functions.begin(), scanned.functions.end(), [&](const SmoothFunction& o) {
-          return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad;
+          return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad && !o.bump && !f.bump;
         });
-    if (there) continue;
-    std::vector<const Variable*> which;
-    std::vector<Eigen::VectorXd> at;
-    for (const std::size_t v : f.of) {
-      which.push_back(&variables[v]);
-      at.push_back(variables[v].value);
-    }
-    const Eigen::MatrixXd phi = members(which, at);
-    const Eigen::VectorXd& place = place_column(system, f.place).column;
-    Eigen::MatrixXd columns(place.size(), phi.cols());
-    for (Eigen::Index k = 0; k < phi.cols(); ++k) columns.col(k) = times(place, f.size_rad * phi.col(k));
-    Block block;
-    block.id = EffectId{.effect = Effect::unnamed, .place = f.place};
-    block.precision = 1;
-    block.parameters = cost;  // of having tried so many functions
-    block.margin = margin;
-    block.function_joint = f.place.body;
-    for (const Variable* v : which) {
-      if (v->is_order) continue;
-      if (v->kind == Covariate::reading) block.function_readings.push_back(v->joint);
-      if (v->kind == Covariate::payload) block.function_load = true;
-    }
-    block.scanned = scanned.functions.size();
-    scanned.functions.push_back(f);
-    add_block(system, block, columns);
+    if (!there) add_function(system, scanned, f, variables, cost);
   }
+}
+
+/// Of the functions that were chosen, only the members that matter, and finer ones where they do: names are decided, now
+/// it is prediction that counts.
+Scored with_relevant_members(GapSystem& system, SubsetSearch& search, Scanned& scanned, Scored best,
+                             const std::vector<Variable>& variables) {
+  const Subset chosen = best.blocks;
+  for (const std::size_t b : chosen) {
+    if (!is_function(system.blocks[b]) || scanned.functions[system.blocks[b].scanned].bump) continue;
+    Subset others;
+    for (const std::size_t o : best.blocks) {
+      if (o != b) others.push_back(o);
+    }
+    const double cost = system.blocks[b].parameters;
+    std::optional<SmoothFunction> finest;
+    double most = -std::numeric_limits<double>::infinity();
+    for (const int harmonics : {2, 4}) {
+      SmoothFunction f = scanned.functions[system.blocks[b].scanned];
+      f.harmonics = harmonics;
+      const std::size_t had = system.blocks.size();
+      add_function(system, scanned, f, variables, cost);
+      if (system.blocks.size() == had) continue;
+      search.extend();
+      const Block& whole = system.blocks.back();
+      if (static_cast<Eigen::Index>(whole.columns.size()) != members(f, variables).cols()) continue;
+      const auto [information, right] = search.given(others, had);
+      double gain = 0;
+      f.share = relevance(information, right, gain);
+      if (!(gain > most)) continue;
+      most = gain;
+      finest = f;
+    }
+    if (!finest) continue;
+    const std::size_t had = system.blocks.size();
+    add_function(system, scanned, *finest, variables, cost);
+    if (system.blocks.size() == had) continue;
+    search.extend();
+    others.push_back(had);
+    const Scored with = search.score(others);
+    if (with.gain > best.gain) best = with;
+  }
+  return best;
 }
 
 void add_slips(GapSystem& system, const std::vector<Slip>& found, const std::vector<Observation>& rows,
@@ -132,8 +189,6 @@ std::vector<bool> in_full(const std::vector<double>& weight) {
   return out;
 }
 
-bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
-
 }  // namespace
 
 bool same_names(const Explanation& a, const Explanation& b) {
@@ -155,7 +210,8 @@ Explainer::Explainer(const RobotFile& robot, const std::vector<Observation>& row
       counts_(in_full(weight)),
       can_(testable(rows, columns)),
       candidates_(candidates(robot, rows, columns, start.set)),
-      variables_(variables(rows, can_)) {
+      variables_(variables(rows, can_)),
+      left_out_(rows) {
   if (counts_.size() != rows.size()) counts_.assign(rows.size(), true);
 }
 
@@ -249,6 +305,14 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   const std::vector<SmoothFunction> after_names =
       smooth_functions(system, remainder(search, best), variables_, 2);
   functions.insert(functions.end(), after_names.begin(), after_names.end());
+  if (rows_.size() <= 300) {  // of many rows the smooth functions do
+    for (const Subset& names : {Subset(), best.blocks}) {
+      const std::vector<SmoothFunction> found =
+          bumps(system, remainder(search, search.score(names)), variables_, 2);
+      functions.insert(functions.end(), found.begin(), found.end());
+      if (best.blocks.empty()) break;
+    }
+  }
   functions.erase(std::remove_if(functions.begin(), functions.end(),
                                  [](const SmoothFunction& f) { return f.gain < margin; }),
                   functions.end());
@@ -261,6 +325,8 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
     best = search.best(most_effects, starts);
   }
 
+  best = only_what_predicts(search, std::move(best));
+  best = with_relevant_members(system, search, scanned, std::move(best), variables_);
   out.solution = best;
   Eigen::Index from = 0;
   for (const std::size_t b : best.blocks) {
@@ -287,6 +353,39 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   return out;
 }
 
+Scored Explainer::only_what_predicts(const SubsetSearch& search, Scored best) const {
+  const std::vector<Block>& blocks = search.system().blocks;
+  std::vector<bool> allowed(blocks.size(), true);
+  for (std::size_t round = 0; round < 2 * most_effects && !best.blocks.empty(); ++round) {
+    const double all = left_out_.chi2_per_number(search, best);
+    double least = all;
+    std::optional<std::size_t> idle;
+    Scored without_it;
+    for (const std::size_t b : best.blocks) {
+      // Of the few poses in a local fault each one left out takes most of it away.
+      if (blocks[b].width_rad > 0) continue;
+      Subset without;
+      for (const std::size_t other : best.blocks) {
+        if (other != b && (is_function(blocks[b]) || !same_name(blocks[other].id, blocks[b].id)))
+          without.push_back(other);
+      }
+      Scored less = search.score(without);
+      const double chi2 = left_out_.chi2_per_number(search, less);
+      if (chi2 > least) continue;
+      least = chi2;
+      idle = b;
+      without_it = std::move(less);
+    }
+    if (!idle) break;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      if (b == *idle || (!is_function(blocks[*idle]) && same_name(blocks[b].id, blocks[*idle].id)))
+        allowed[b] = false;
+    }
+    best = round < most_effects ? search.best(most_effects, {without_it.blocks}, allowed) : without_it;
+  }
+  return best;
+}
+
 void Explainer::judge(Explanation& found) const {
   const Remainder left = remainder(*found.search, found.solution);
   for (const Piece& piece : found.pieces) {
@@ -298,6 +397,8 @@ void Explainer::judge(Explanation& found) const {
     for (const std::size_t v : piece.function->of) {
       m.covariates.push_back(found.variables[v].name());
       m.around_deg.emplace_back();
+      if (piece.function->bump)
+        m.around_deg.back() = degrees(piece.function->bump->centre_rad[m.covariates.size() - 1]);
     }
     Subset without;
     for (std::size_t k = 0; k < found.solution.blocks.size(); ++k) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "diagnosis/candidates.hpp"
+#include "diagnosis/cross_validation.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/gap_system.hpp"
 #include "diagnosis/remainder.hpp"
@@ -18,6 +19,10 @@
 namespace flexcomp::host {
 
 struct Refit;
+
+/// A row that nothing explains costs this much chi-square and no more: it is then an outlier (99.9 % of the chi-square of
+/// six numbers, and what it takes to say so of one row among hundreds).
+constexpr double outlier_price = 40;
 
 /// One part of an explanation with what the linear search found for it.
 struct Piece {
@@ -63,6 +68,8 @@ class Explainer {
   /// Estimate of the start's own parameters and frames after a refit.
   Estimate nuisance_of(const Refit& refit) const;
   void judge(Explanation& found) const;
+  /// What helps on poses that were left out; the rest goes, and others may come in its place.
+  Scored only_what_predicts(const SubsetSearch& search, Scored best) const;
 
   const RobotFile& robot_;
   const std::vector<Observation>& rows_;
@@ -72,6 +79,7 @@ class Explainer {
   Testable can_;
   CandidateSet candidates_;
   std::vector<Variable> variables_;
+  LeftOutPoses left_out_;
 };
 
 bool same_names(const Explanation& a, const Explanation& b);

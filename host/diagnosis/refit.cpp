@@ -1,6 +1,8 @@
 #include "diagnosis/refit.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -32,6 +34,45 @@ bool is_free(const CurveParts& parts, std::size_t coefficient) {
   });
 }
 
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Fine positions along one side of a grid, and the node values of the broken line that comes closest to values there.
+struct Between {
+  explicit Between(const std::vector<double>& nodes) {
+    constexpr Eigen::Index steps = 8;
+    const Eigen::Index cells = static_cast<Eigen::Index>(nodes.size()) - 1;
+    at.resize(cells * steps + 1);
+    Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(at.size(), cells + 1);
+    for (Eigen::Index k = 0; k < at.size(); ++k) {
+      const Eigen::Index cell = std::min(k / steps, cells - 1);
+      const double share = static_cast<double>(k - cell * steps) / steps;
+      const auto from = static_cast<std::size_t>(cell);
+      at[k] = nodes[from] + share * (nodes[from + 1] - nodes[from]);
+      hats(k, cell) = 1 - share;
+      hats(k, cell + 1) = share;
+    }
+    nearest = (hats.transpose() * hats).llt().solve(hats.transpose());
+  }
+  Eigen::VectorXd at;
+  Eigen::MatrixXd nearest;  ///< node values = nearest * values
+};
+
+/// Nodes close together where a bump is, in every turn between low and high.
+std::vector<double> nodes_of(const Bump& bump, std::size_t side, double low, double high) {
+  std::vector<double> nodes{low, high};
+  const double first = bump.centre_rad[side] + 2 * pi * std::floor((low - bump.centre_rad[side]) / (2 * pi));
+  for (double centre = first; centre < high + 2 * pi; centre += 2 * pi) {
+    for (int k = -4; k <= 4; ++k) {
+      const double at = centre + 0.5 * bump.spacing_rad * k;
+      if (at > low && at < high) nodes.push_back(at);
+    }
+  }
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end(), [](double a, double b) { return b - a < 1e-6; }),
+              nodes.end());
+  return nodes;
+}
+
 /// The smooth function as a table that the core reads: its values at nodes of two variables.
 void add_table_of(const Piece& piece, const Explanation& found, const RobotFile& robot,
                   ParametricModel& model) {
@@ -48,6 +89,10 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
       const double low = of[side]->value.minCoeff();
       const double high = of[side]->value.maxCoeff();
       const std::size_t count = of[side]->kind == Covariate::reading ? nodes : 5;
+      if (piece.function->bump) {
+        id.node[side] = nodes_of(*piece.function->bump, side, low, high);
+        continue;
+      }
       for (std::size_t k = 0; k < count; ++k)
         id.node[side].push_back(low + (high - low) * static_cast<double>(k) / static_cast<double>(count - 1));
     } else {
@@ -60,21 +105,24 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
   const Term<double>& term = model.set.terms.back();
   double* values =
       model.set.values.data() + model.set.tables[term.table].offset + id.node[0].size() + id.node[1].size();
-  const std::size_t rows = id.node[0].size();
-  const std::size_t columns = id.node[1].size();
-  std::vector<Eigen::VectorXd> at(of.size(), Eigen::VectorXd(static_cast<Eigen::Index>(rows * columns)));
-  for (std::size_t r = 0; r < rows; ++r) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const Eigen::Index cell = static_cast<Eigen::Index>(r * columns + c);
-      at[0][cell] = id.node[0][r];
-      if (at.size() > 1) at[1][cell] = id.node[1][c];
+  // Not the function's values at the nodes, but those whose straight lines between them come closest to it.
+  const std::array<Between, 2> between{Between(id.node[0]), Between(id.node[1])};
+  const Eigen::Index rows = between[0].at.size();
+  const Eigen::Index columns = between[1].at.size();
+  std::vector<Eigen::VectorXd> at(of.size(), Eigen::VectorXd(rows * columns));
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      at[0][r * columns + c] = between[0].at[r];
+      if (at.size() > 1) at[1][r * columns + c] = between[1].at[c];
     }
   }
-  const Eigen::MatrixXd phi = members(of, at);
+  const Eigen::MatrixXd phi = members(*piece.function, found.variables, at);
   // Columns that the projection took away have no coefficient: then the numbers differ, and the function is as it was.
   if (phi.cols() != piece.value.size()) return;
   const Eigen::VectorXd v = phi * piece.value;
-  for (Eigen::Index k = 0; k < v.size(); ++k) values[k] = v[k];
+  const Eigen::Map<const RowMajor> fine(v.data(), rows, columns);
+  const RowMajor coarse = between[0].nearest * fine * between[1].nearest.transpose();
+  for (Eigen::Index k = 0; k < coarse.size(); ++k) values[k] = coarse.data()[k];
 }
 
 /// Turns a curve's mean over the readings that occur into the offset of its joint: the pose stays what it is.
@@ -195,7 +243,7 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
 }
 
 void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
-              const std::vector<Observation>& rows) {
+              const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance) {
   const TermSet& set = refit.fit.estimate.set;
   for (EffectGroup& group : effects_of(set, robot.nominal)) {
     if (!same_name(group.id, effect.id)) continue;
@@ -219,8 +267,17 @@ void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
     const auto without_model = prepare(without.set, robot, "diagnosis");
     const std::vector<RowResidual> a = residuals(refit.fit.estimate, *with_model, rows);
     const std::vector<RowResidual> b = residuals(without, *without_model, rows);
+    Eigen::VectorXd shift(6 * static_cast<Eigen::Index>(rows.size()));
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      const double moved = (a[k].position_m - b[k].position_m).norm();
+      Vector6<double> e;
+      e << a[k].position_m - b[k].position_m, a[k].orientation_rad - b[k].orientation_rad;
+      shift.segment<6>(6 * static_cast<Eigen::Index>(k)) = rows[k].whitening * e;
+    }
+    // What geometry and frames would take up is theirs: an axis that tilts once a turn is largely a tilted base.
+    shift -= nuisance * (nuisance.transpose() * shift);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double moved =
+          unwhitened(rows[k], shift.segment<6>(6 * static_cast<Eigen::Index>(k))).head<3>().norm();
       effect.largest_m = std::max(effect.largest_m, moved);
       effect.rms_m += moved * moved / static_cast<double>(rows.size());
     }

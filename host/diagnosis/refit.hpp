@@ -21,9 +21,10 @@ struct Refit {
 Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
                  const Unknowns& fitted, const Explanation& found);
 
-/// Coefficients, and how far the effect moves the measured point.
+/// Coefficients, and how far the effect moves the measured point beyond what the model's other parts would take up.
+/// \param nuisance  orthonormal basis of these, whitened as the rows are
 void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
-              const std::vector<Observation>& rows);
+              const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance);
 
 }  // namespace flexcomp::host
 

@@ -41,6 +41,12 @@ double spline(double x) {
 
 double turn_apart(double a, double b) { return std::remainder(a - b, 2 * pi); }
 
+double value_of(const Bump& bump, double x, double y) {
+  // 1 in the middle: 9/4 times the product of two splines of 2/3.
+  return 2.25 * spline(turn_apart(x, bump.centre_rad[0]) / bump.spacing_rad) *
+         spline(turn_apart(y, bump.centre_rad[1]) / bump.spacing_rad);
+}
+
 }  // namespace
 
 Remainder remainder(const SubsetSearch& search, const Scored& solution) {
@@ -72,6 +78,14 @@ Remainder remainder(const SubsetSearch& search, const Scored& solution) {
   out.fitted_numbers += added.squaredNorm();
   out.basis.resize(added.rows(), system.nuisance.cols() + count);
   out.basis << system.nuisance, added;
+  return out;
+}
+
+Remainder remainder(const GapSystem& system) {
+  Remainder out;
+  out.residual = system.residual;
+  out.basis = system.nuisance;
+  out.fitted_numbers = static_cast<double>(system.nuisance.cols());
   return out;
 }
 
@@ -272,17 +286,203 @@ Eigen::MatrixXd members_of_one(const Variable& range, const Eigen::VectorXd& at,
 
 }  // namespace
 
-Eigen::MatrixXd members(const std::vector<const Variable*>& of, const std::vector<Eigen::VectorXd>& at) {
-  if (of.size() == 1) return members_of_one(*of[0], at[0], 4);
-  const Eigen::MatrixXd a = members_of_one(*of[0], at[0], 2);
-  const Eigen::MatrixXd b = members_of_one(*of[1], at[1], 2);
-  Eigen::MatrixXd all(a.rows(), a.cols() + b.cols() + a.cols() * b.cols());
-  all << a, b, Eigen::MatrixXd(a.rows(), a.cols() * b.cols());
-  for (Eigen::Index i = 0; i < a.cols(); ++i) {
-    for (Eigen::Index k = 0; k < b.cols(); ++k)
-      all.col(a.cols() + b.cols() + i * b.cols() + k) = a.col(i).cwiseProduct(b.col(k));
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables,
+                        const std::vector<Eigen::VectorXd>& at) {
+  const Variable& first = variables[function.of[0]];
+  Eigen::MatrixXd all;
+  if (function.bump) {
+    all.resize(at[0].size(), 1);
+    for (Eigen::Index k = 0; k < all.rows(); ++k) all(k, 0) = value_of(*function.bump, at[0][k], at[1][k]);
+  } else if (function.of.size() == 1) {
+    all = members_of_one(first, at[0], 2 * function.harmonics);
+  } else {
+    const Eigen::MatrixXd a = members_of_one(first, at[0], function.harmonics);
+    const Eigen::MatrixXd b = members_of_one(variables[function.of[1]], at[1], function.harmonics);
+    all.resize(a.rows(), a.cols() + b.cols() + a.cols() * b.cols());
+    all << a, b, Eigen::MatrixXd(a.rows(), a.cols() * b.cols());
+    for (Eigen::Index i = 0; i < a.cols(); ++i) {
+      for (Eigen::Index k = 0; k < b.cols(); ++k)
+        all.col(a.cols() + b.cols() + i * b.cols() + k) = a.col(i).cwiseProduct(b.col(k));
+    }
   }
+  if (function.share.size() == 0) return all;
+  std::vector<Eigen::Index> stay;
+  for (Eigen::Index k = 0; k < all.cols(); ++k) {
+    if (function.share[k] > 0) stay.push_back(k);
+  }
+  return all(Eigen::all, stay) * function.share(stay).asDiagonal();
+}
+
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables) {
+  std::vector<Eigen::VectorXd> at;
+  for (const std::size_t v : function.of) at.push_back(variables[v].value);
+  return members(function, variables, at);
+}
+
+namespace {
+
+/// Rows that a spline touches, and its value there.
+using Touched = std::vector<std::pair<Eigen::Index, double>>;
+
+Touched touched_by(const Eigen::VectorXd& x, double centre, double spacing) {
+  Touched out;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double value = 1.5 * spline(turn_apart(x[k], centre) / spacing);
+    if (value > 0) out.emplace_back(k, value);
+  }
+  return out;
+}
+
+/// What a bump of a joint would take from chi-square less what its four numbers cost; none where it is not above `least`.
+/// \param y  value of the second spline at every row
+std::optional<double> gain_above(double least, const Scalar& s, const Touched& x, const Eigen::VectorXd& y,
+                                 double noise_scale2, double log_n) {
+  double b = 0;
+  double square = 0;
+  std::size_t touched = 0;
+  for (const auto& [k, value] : x) {
+    const double phi = value * y[k];
+    if (phi <= 0 || !(s.square[k] > 0)) continue;
+    b += phi * s.product[k];
+    square += phi * phi * s.square[k];
+    if (phi > 0.05) ++touched;
+  }
+  // Two poses would do for a line. What the rest of the model takes of a bump is seldom more than half.
+  if (touched < 4 || !(b * b / (0.4 * square) / noise_scale2 - 4 * log_n > least)) return {};
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(s.basis.rows());
+  for (const auto& [k, value] : x) {
+    if (y[k] > 0 && s.square[k] > 0) w += value * y[k] * s.basis.col(k);
+  }
+  const double norm = square - w.squaredNorm();
+  if (!(norm > 0.05 * square)) return {};
+  const double gain = b * b / norm / noise_scale2 - 4 * log_n;
+  if (!(gain > least)) return {};
+  return gain;
+}
+
+Eigen::VectorXd at_every_row(const Touched& touched, Eigen::Index rows) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(rows);
+  for (const auto& [k, value] : touched) out[k] = value;
+  return out;
+}
+
+/// Splines of one reading side by side over the turn.
+struct Row {
+  std::vector<double> centre_rad;
+  std::vector<Touched> touched;
+  std::vector<Eigen::VectorXd> value;
+  Row(const Eigen::VectorXd& x, double spacing) {
+    const int count = static_cast<int>(std::ceil(4 * pi / spacing));
+    for (int c = 0; c < count; ++c) {
+      centre_rad.push_back(-pi + 2 * pi * c / count);
+      touched.push_back(touched_by(x, centre_rad.back(), spacing));
+      value.push_back(at_every_row(touched.back(), x.size()));
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<SmoothFunction> bumps(const GapSystem& system, const Remainder& left,
+                                  const std::vector<Variable>& of, std::size_t most) {
+  constexpr std::array<double, 3> spacings{0.5, 0.8, 1.2};
+  const double log_n = std::log(std::max(2.0, system.numbers));
+  std::vector<Scalar> joints;
+  for (unsigned j = 1; j <= joint_count; ++j) {
+    joints.push_back(
+        scalar(system, left, place_column(system, {static_cast<std::uint8_t>(j), slot::theta}).column));
+  }
+  std::vector<std::vector<Row>> rows_of(of.size());
+  for (std::size_t v = 0; v < of.size(); ++v) {
+    if (of[v].is_order || of[v].kind != Covariate::reading) continue;
+    for (const double spacing : spacings) rows_of[v].emplace_back(of[v].value, spacing);
+  }
+  std::vector<SmoothFunction> all;
+  for (std::size_t a = 0; a < of.size(); ++a) {
+    for (std::size_t b = a + 1; b < of.size(); ++b) {
+      if (of[a].is_order || of[b].is_order || of[a].kind != Covariate::reading ||
+          of[b].kind != Covariate::reading)
+        continue;
+      for (unsigned j = 1; j <= joint_count; ++j) {
+        SmoothFunction best;
+        best.place = {static_cast<std::uint8_t>(j), slot::theta};
+        best.of = {a, b};
+        best.size_rad = 1e-4;
+        best.gain = 0;
+        const Scalar& joint = joints[j - 1];
+        for (std::size_t w = 0; w < spacings.size(); ++w) {
+          const Row& first = rows_of[a][w];
+          const Row& second = rows_of[b][w];
+          for (std::size_t x = 0; x < first.touched.size(); ++x) {
+            for (std::size_t y = 0; y < second.value.size(); ++y) {
+              const auto gain =
+                  gain_above(best.gain, joint, first.touched[x], second.value[y], left.noise_scale2, log_n);
+              if (!gain) continue;
+              best.gain = *gain;
+              best.bump = Bump{{first.centre_rad[x], second.centre_rad[y]}, spacings[w]};
+            }
+          }
+        }
+        // Place and width more closely.
+        double step = 0.25;
+        for (int round = 0; best.bump && round < 5; ++round, step /= 2) {
+          const Bump from = *best.bump;
+          for (const double dx : {-step, 0.0, step}) {
+            for (const double dy : {-step, 0.0, step}) {
+              for (const double wider : {1 - step, 1.0, 1 + step}) {
+                const Bump bump{
+                    {from.centre_rad[0] + dx * from.spacing_rad, from.centre_rad[1] + dy * from.spacing_rad},
+                    from.spacing_rad * wider};
+                const auto gain = gain_above(
+                    best.gain, joint, touched_by(of[a].value, bump.centre_rad[0], bump.spacing_rad),
+                    at_every_row(touched_by(of[b].value, bump.centre_rad[1], bump.spacing_rad),
+                                 of[b].value.size()),
+                    left.noise_scale2, log_n);
+                if (!gain) continue;
+                best.gain = *gain;
+                best.bump = bump;
+              }
+            }
+          }
+        }
+        if (best.bump) all.push_back(best);
+      }
+    }
+  }
+  std::sort(all.begin(), all.end(),
+            [](const SmoothFunction& x, const SmoothFunction& y) { return x.gain > y.gain; });
+  if (all.size() > most) all.resize(most);
   return all;
+}
+
+Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain) {
+  constexpr int rounds = 100;
+  constexpr double gone = 1e-8;
+  const Eigen::Index n = right.size();
+  Eigen::VectorXd variance = Eigen::VectorXd::Ones(n);
+  Eigen::VectorXd determined = Eigen::VectorXd::Zero(n);
+  gain = 0;
+  for (int round = 0; round <= rounds; ++round) {
+    // In members of which each has the prior 1: never singular.
+    const Eigen::VectorXd size = variance.cwiseSqrt();
+    Eigen::MatrixXd normal = size.asDiagonal() * information * size.asDiagonal();
+    normal.diagonal().array() += 1;
+    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+    if (factor.info() != Eigen::Success) break;
+    const Eigen::VectorXd scaled = size.asDiagonal() * right;
+    const Eigen::VectorXd mean = factor.solve(scaled);
+    const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(n, n));
+    determined = 1 - covariance.diagonal().array();
+    gain = mean.dot(scaled) - 2 * factor.matrixLLT().diagonal().array().log().sum() -
+           2 * static_cast<double>((variance.array() > gone).count());
+    if (round == rounds) break;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double square = mean[k] * mean[k];
+      variance[k] *= variance[k] > gone && square > 0 ? square / std::max(determined[k], 1e-12) : 0;
+      variance[k] = variance[k] > gone ? std::min(variance[k], 1e4) : 0;
+    }
+  }
+  return variance.cwiseSqrt();
 }
 
 std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Remainder& left,
@@ -305,13 +505,9 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
   }
   std::vector<SmoothFunction> all;
   for (const std::vector<std::size_t>& set : sets) {
-    std::vector<const Variable*> which;
-    std::vector<Eigen::VectorXd> at;
-    for (const std::size_t v : set) {
-      which.push_back(&of[v]);
-      at.push_back(of[v].value);
-    }
-    const Eigen::MatrixXd phi = members(which, at);
+    SmoothFunction kind;
+    kind.of = set;
+    const Eigen::MatrixXd phi = members(kind, of);
     for (unsigned j = 1; j <= joint_count; ++j) {
       // A coupling of the direction of one joint to another is nobody's.
       if (set.size() == 1 && of[set[0]].kind == Covariate::direction && of[set[0]].joint == j) continue;
@@ -321,9 +517,8 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
       const Eigen::VectorXd b = phi.transpose() * s.product / left.noise_scale2;
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
       const Eigen::VectorXd along = eigen.eigenvectors().transpose() * b;
-      SmoothFunction f;
+      SmoothFunction f = kind;
       f.place = {static_cast<std::uint8_t>(j), slot::theta};
-      f.of = set;
       f.gain = -1e300;
       for (const double size : sizes) {
         double gain = -tried;

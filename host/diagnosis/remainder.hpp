@@ -27,6 +27,8 @@ struct Remainder {
 };
 
 Remainder remainder(const SubsetSearch& search, const Scored& solution);
+/// Nothing found, the noise as declared.
+Remainder remainder(const GapSystem& system);
 
 /// Shares of all places, largest first: a motion of the place alone, free from pose to pose. p from the chi-square
 /// distribution with the moments that the noise gives.
@@ -63,19 +65,39 @@ struct Variable {
 };
 std::vector<Variable> variables(const std::vector<Observation>& rows, const Testable& can);
 
+/// A function that is not zero only near one pair of joint readings: the product of a cubic B-spline of each, of knots
+/// `spacing_rad` apart.
+struct Bump {
+  std::array<double, 2> centre_rad{};
+  double spacing_rad = 0;
+};
+
 /// A smooth function of one or two variables that turns a joint.
 struct SmoothFunction {
   Place place;
   std::vector<std::size_t> of;  ///< indices of variables, one or two
   double size_rad = 0;          ///< prior standard deviation of a coefficient
+  std::optional<Bump> bump;     ///< then it has this one member
+  int harmonics = 2;            ///< of each joint reading, in products
+  Eigen::VectorXd share;        ///< of the size, per member; members of 0 are left out; empty: all of it
   double gain = 0;  ///< evidence: 2 ln of the Bayes factor, less 2 ln of the number of functions tried
 };
 std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Remainder& left,
                                              const std::vector<Variable>& of, std::size_t most);
+/// The best bumps of two joint readings that turn a joint, best first; each has numbers for size, place and width (4).
+std::vector<SmoothFunction> bumps(const GapSystem& system, const Remainder& left,
+                                  const std::vector<Variable>& of, std::size_t most);
 /// Values of the function's members (columns, scaled to a prior standard deviation of 1) at given values of its
-/// variables; `of[k]` belongs to the range of `variables[k]`.
-Eigen::MatrixXd members(const std::vector<const Variable*>& variables,
+/// variables; `at[k]` belongs to the range of the variable `function.of[k]`.
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables,
                         const std::vector<Eigen::VectorXd>& at);
+/// The same at the rows.
+Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variable>& variables);
+
+/// Which members of a function matter: for each a prior variance of its own, by maximum evidence (automatic relevance
+/// determination: MacKay 1992; Tipping 2001). `information` and `right` are of the members whose prior is 1. Standard
+/// deviations; the evidence less 2 per member that stays is put into `gain`.
+Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain);
 
 }  // namespace flexcomp::host
 

@@ -229,6 +229,33 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
   return gains;
 }
 
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& others,
+                                                                std::size_t block) const {
+  std::vector<Eigen::Index> index;
+  std::vector<double> prior;
+  for (const std::size_t b : others) {
+    for (const Eigen::Index c : system_.blocks[b].columns) {
+      index.push_back(c);
+      prior.push_back(precision_of(system_.blocks[b], c));
+    }
+  }
+  const std::vector<Eigen::Index>& own = system_.blocks[block].columns;
+  Eigen::MatrixXd information = gram_(own, own);
+  Eigen::VectorXd right = product_(own);
+  if (index.empty()) return {information, right};
+  Eigen::MatrixXd normal = gram_(index, index);
+  normal.diagonal() +=
+      Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
+  Eigen::MatrixXd across = gram_(index, own);
+  Eigen::MatrixXd done = product_(index);
+  if (!factor_in_place(normal)) return {information, right};
+  solve_lower(normal, across);
+  solve_lower(normal, done);
+  information -= gram(across);
+  right -= across.transpose() * done;
+  return {information, right};
+}
+
 Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts,
                           const std::vector<bool>& allowed) const {
   constexpr std::size_t beam = 4;

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/gap_system.hpp"
@@ -41,6 +42,10 @@ class SubsetSearch {
   /// Gain of every block when added to a subset (minus infinity where it must not be); gains of blocks of size k cost
   /// k ln n.
   std::vector<double> extensions(const Subset& subset) const;
+
+  /// What the data know of a block's coefficients when those of others are free within their priors: information and
+  /// right-hand side of its normal equations, its own prior left out.
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> given(const Subset& others, std::size_t block) const;
 
   /// Gains of each block alone for other residuals (columns of `right`: columns' products with them).
   Eigen::VectorXd largest_single_gains(const Eigen::MatrixXd& residuals) const;

@@ -2,13 +2,8 @@
 // were not fitted, and that nothing runs off although three axes are parallel.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <optional>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,33 +12,13 @@
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
 #include "measurement/observation.hpp"
+#include "support/measured_arm.hpp"
 #include "units.hpp"
 
 namespace {
 
 using namespace flexcomp;
 using namespace flexcomp::host;
-
-std::string data_folder() {
-  if (const char* set = std::getenv("FLEXCOMP_DATA")) return set;
-  return std::string(FLEXCOMP_SOURCE_DIR) + "/../shared/data";
-}
-
-struct Arm {
-  RobotFile robot;
-  std::string folder;
-
-  std::vector<Observation> rows(const std::string& file) const {
-    return observe(load_data(folder + file, robot), robot);
-  }
-};
-
-/// Nothing where the data are absent.
-std::optional<Arm> arm(const std::string& name) {
-  const std::string folder = data_folder() + "/" + name + "/";
-  if (!std::filesystem::exists(folder)) return {};
-  return Arm{load_robot(folder + "robot.yaml"), folder};
-}
 
 IdentifyOptions geometry_and_gravity(bool robust) {
   IdentifyOptions options;
@@ -68,23 +43,19 @@ void expect_small(const Calibration& calibration, const RobotFile& robot) {
 
 /// Mean error (mm) on a random third, fitted on the rest.
 double held_out_third(const RobotFile& robot, std::vector<Observation> rows, unsigned split, bool robust) {
-  std::mt19937 random(split);
-  std::shuffle(rows.begin(), rows.end(), random);
-  const auto third = static_cast<std::ptrdiff_t>(rows.size() / 3);
-  const std::vector<Observation> test(rows.begin(), rows.begin() + third);
-  const std::vector<Observation> train(rows.begin() + third, rows.end());
-  const Identification r = identify(robot, train, "train", geometry_and_gravity(robust));
+  const Thirds parts(std::move(rows), split);
+  const Identification r = identify(robot, parts.train, "train", geometry_and_gravity(robust));
   EXPECT_TRUE(r.fit.converged);
   expect_small(r.calibration, robot);
-  const ErrorStatistics after = validate(robot, r.calibration, test, "held out").after;
+  const ErrorStatistics after = validate(robot, r.calibration, parts.test, "held out").after;
   std::printf("  split %u, %s: held out %.4f mm mean, %.4f rms, %.4f max; %zu outliers\n", split,
               robust ? "robust" : "plain", after.mean_m * 1e3, after.rms_m * 1e3, after.max_m * 1e3,
               r.outliers.size());
   return after.mean_m * 1e3;
 }
 
-TEST(RealArms, Ur5FromTheGridToTheSourcesRandomPoses) {
-  const auto ur5 = arm("ur5-jacobi");
+TEST(MeasuredArms, Ur5FromTheGridToTheSourcesRandomPoses) {
+  const auto ur5 = measured_arm("ur5-jacobi");
   if (!ur5) GTEST_SKIP() << "REAL DATA: not run";
   for (const bool robust : {false, true}) {
     const Identification r =
@@ -115,25 +86,25 @@ void expect_on_held_out_thirds(const RobotFile& robot, const std::vector<Observa
   }
 }
 
-TEST(RealArms, Ur10SeriesAOnAHeldOutThird) {
-  const auto ur10 = arm("ur10-ipa");
+TEST(MeasuredArms, Ur10SeriesAOnAHeldOutThird) {
+  const auto ur10 = measured_arm("ur10-ipa");
   if (!ur10) GTEST_SKIP() << "REAL DATA: not run";
   std::vector<Observation> rows = ur10->rows("series_a.csv");
   rows.resize(1500);
   expect_on_held_out_thirds(ur10->robot, rows, 0.37);
 }
 
-TEST(RealArms, Ur10SeriesBOnAHeldOutThird) {
-  const auto ur10 = arm("ur10-ipa");
+TEST(MeasuredArms, Ur10SeriesBOnAHeldOutThird) {
+  const auto ur10 = measured_arm("ur10-ipa");
   if (!ur10) GTEST_SKIP() << "REAL DATA: not run";
   expect_on_held_out_thirds(ur10->robot, ur10->rows("series_b.csv"), 0.38);
 }
 
 // The project's own robot files hold the same arms as the data's.
-TEST(RealArms, TheProjectsRobotFilesAreTheseArms) {
+TEST(MeasuredArms, TheProjectsRobotFilesAreTheseArms) {
   for (const auto& [folder, file] : {std::pair<const char*, const char*>{"ur5-jacobi", "ur5.yaml"},
                                      std::pair<const char*, const char*>{"ur10-ipa", "ur10.yaml"}}) {
-    const auto theirs = arm(folder);
+    const auto theirs = measured_arm(folder);
     if (!theirs) GTEST_SKIP() << "REAL DATA: not run";
     const RobotFile ours = load_robot(std::string(FLEXCOMP_SOURCE_DIR "/host/robots/") + file);
     EXPECT_EQ(nominal_hash(ours.nominal), nominal_hash(theirs->robot.nominal)) << file;
