@@ -260,6 +260,13 @@ std::vector<Row> read_joints(const std::string& path, const Nominal& nominal) {
   return rows;
 }
 
+void save(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+}
+
 void Table::row(const std::vector<double>& values) {
   if (values.size() != header_.size()) throw std::logic_error("a row of another length than the header");
   rows_.push_back(values);
@@ -278,10 +285,7 @@ void Table::save(const std::string& path) const {
     }
     text += '\n';
   }
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+  plant::save(path, text);
 }
 
 }  // namespace plant

@@ -22,6 +22,8 @@ struct Row {
 };
 std::vector<Row> read_joints(const std::string& path, const Nominal& nominal);
 
+void save(const std::string& path, const std::string& text);
+
 /// Comma-separated text that is written as a whole at the end.
 class Table {
  public:

@@ -3,6 +3,7 @@
 /// see, and says where the arm really goes. Shares no code with the core or the calibrator.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -35,7 +36,7 @@ const std::map<std::string, Noise> noises{
     {"N1", {0.035e-3, 0.007 * degree}}, {"N2", {0.07e-3, 0.014 * degree}}, {"none", {0, 0}}};
 
 struct Options {
-  std::string robot, truth, measure = "reflectors", noise = "N1", joints, nominal, out, json;
+  std::string robot, truth, measure = "reflectors", noise = "N1", joints, nominal, out, json, points, log;
   std::vector<double> payloads_kg;
   bool moves = false;
   unsigned poses = 0;
@@ -133,6 +134,61 @@ void measure(const Options& options) {
               options.measure.c_str(), options.noise.c_str());
 }
 
+/// Where the tracker of session() stands in Fb: in front of the arm, turned towards it and not quite upright.
+const KDL::Frame tracker_in_base(KDL::Rotation::RPY(0.3 * degree, -0.2 * degree, 171 * degree),
+                                 KDL::Vector(2.5, -0.4, 0.3));
+
+/// What a day in the cell leaves behind: the point list that the tracker's program exports, in the tracker's own frame,
+/// and the robot's log. Both call a pose by its place in the plan. Where a controller corrects the commands, the log has
+/// what the program wanted.
+void session(const Options& options) {
+  const Nominal robot = read_robot(options.robot);
+  const Truth truth = read_truth(options.truth, robot);
+  const std::vector<Row> poses = read_joints(options.joints, robot);
+  const std::vector<Row> wanted = options.nominal.empty() ? poses : read_joints(options.nominal, robot);
+  if (wanted.size() != poses.size()) {
+    throw std::runtime_error(options.joints + " has " + std::to_string(poses.size()) + " rows, " +
+                             options.nominal + " has " + std::to_string(wanted.size()));
+  }
+  const double sigma = noises.at(options.noise).position_m;
+  if (robot.reflector_m.size() < 3) {
+    throw std::runtime_error(options.robot + ": tool.reflectors_mm: expected a, b, c (, d)");
+  }
+  std::mt19937_64 random(options.seed);
+  std::normal_distribution<double> normal;
+  std::string points =
+      "// Units: Millimeters, Degrees\n// Frame: Instrument::0\n// Collection::Group::Point X Y Z\n";
+  std::string log = "pose";
+  for (std::size_t j = 1; j <= joints; ++j) log += ",J" + std::to_string(j) + " [deg]";
+  log += ",payload_kg\n";
+  std::array<char, 160> line{};
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    const Row& pose = wanted[n];
+    std::snprintf(line.data(), line.size(), "P%02zu", n + 1);
+    const std::string name = line.data();
+    log += name;
+    for (const double q : pose.q_rad) {
+      std::snprintf(line.data(), line.size(), ",%.4f", q / degree);
+      log += line.data();
+    }
+    std::snprintf(line.data(), line.size(), ",%g\n", pose.context.payload_kg);
+    log += line.data();
+    const Reached arm = reached(robot, truth, poses[n].q_rad, pose.context);
+    for (std::size_t r = 0; r < robot.reflector_m.size(); ++r) {
+      KDL::Vector seen = tracker_in_base.Inverse() * (arm.tool * (arm.slip + robot.reflector_m[r]));
+      for (int k = 0; k < 3; ++k) seen[k] += sigma * normal(random);
+      std::snprintf(line.data(), line.size(), "Cell::%s_%c %.4f %.4f %.4f\n", name.c_str(), "abcd"[r],
+                    seen[0] / millimetre, seen[1] / millimetre, seen[2] / millimetre);
+      points += line.data();
+    }
+  }
+  save(options.points, points);
+  save(options.log, log);
+  std::printf("%s: %zu points of %zu poses (noise %s); %s: the robot's log\n", options.points.c_str(),
+              poses.size() * robot.reflector_m.size(), poses.size(), options.noise.c_str(),
+              options.log.c_str());
+}
+
 /// Of one number over all poses.
 struct Summary {
   double sum = 0, squares = 0, max = 0;
@@ -202,27 +258,42 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* measuring =
       app.add_subcommand("measure", "What an instrument sees at random poses within the limits");
+  CLI::App* cell = app.add_subcommand(
+      "session", "A tracker's export and the robot's log of planned poses, as a measuring cell leaves them");
   CLI::App* asking = app.add_subcommand("where", "Where the arm really goes for joint commands");
-  for (CLI::App* command : {measuring, asking}) {
+  for (CLI::App* command : {measuring, cell, asking}) {
     command->add_option("--robot", options.robot, "Robot file")->required();
     command->add_option("--truth", options.truth, "Truth file: the hidden errors")->required();
+  }
+  for (CLI::App* command : {measuring, asking})
     command->add_option("-o,--output", options.out, "CSV file to write")->required();
+  for (CLI::App* command : {measuring, cell}) {
+    command->add_option("--seed", options.seed, "Of everything that is random")->capture_default_str();
+    command->add_option("--noise", options.noise, "N1: 0.035 mm and 0.007 deg per axis; N2: twice that; none")
+        ->check(CLI::IsMember({"N1", "N2", "none"}))
+        ->capture_default_str();
   }
   measuring->add_option("--poses", options.poses, "Number of poses")
       ->check(CLI::Range(1U, 1000000U))
       ->required();
-  measuring->add_option("--seed", options.seed, "Of poses and noise")->capture_default_str();
   measuring->add_option("--measure", options.measure, "reflectors (A, B, C, D), pose or position")
       ->check(CLI::IsMember({"reflectors", "pose", "position"}))
-      ->capture_default_str();
-  measuring->add_option("--noise", options.noise, "N1: 0.035 mm and 0.007 deg per axis; N2: twice that; none")
-      ->check(CLI::IsMember({"N1", "N2", "none"}))
       ->capture_default_str();
   measuring
       ->add_option("--payloads", options.payloads_kg, "Payloads in turn [kg]; otherwise the robot file's")
       ->delimiter(',');
   measuring->add_flag("--moves", options.moves,
                       "Each joint comes to the pose by a random motion, which is recorded");
+  cell->add_option("--joints", options.joints,
+                   "The plan: joints q1_deg … q6_deg, with payload_kg and what else acts")
+      ->required();
+  cell->add_option(
+      "--nominal", options.nominal,
+      "Uncorrected joints, where --joints are a controller's: the log has these, with the context");
+  cell->add_option("--points", options.points,
+                   "Point list to write, of the reflectors, in the tracker's frame")
+      ->required();
+  cell->add_option("--log", options.log, "The robot's log to write")->required();
   asking->add_option("--joints", options.joints, "Commanded joints, q1_deg … q6_deg")->required();
   asking
       ->add_option(
@@ -234,6 +305,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (measuring->parsed()) measure(options);
+    if (cell->parsed()) session(options);
     if (asking->parsed()) where(options);
     return 0;
   } catch (const CLI::ParseError& e) {

@@ -23,15 +23,28 @@ nlohmann::ordered_json to_json(const Before& before) {
   return j;
 }
 
-std::string accuracy_table(const Before& before, const ErrorStatistics& after) {
-  const auto line = [](const char* what, const ErrorStatistics& s) {
-    return fmt::format("  {:<24} {:>10.4f} {:>10.4f} {:>10.4f}{}", what, s.mean_m * 1e3, s.rms_m * 1e3,
-                       s.max_m * 1e3, s.mean_rad ? fmt::format(" {:>10.5f}", degrees(*s.mean_rad)) : "");
-  };
+namespace {
+
+std::string line(const char* what, const ErrorStatistics& s) {
+  return fmt::format("  {:<24} {:>10.4f} {:>10.4f} {:>10.4f}{}", what, s.mean_m * 1e3, s.rms_m * 1e3,
+                     s.max_m * 1e3, s.mean_rad ? fmt::format(" {:>10.5f}", degrees(*s.mean_rad)) : "");
+}
+
+std::string head_line(const ErrorStatistics& s) {
   const std::string head =
       fmt::format("  {:<24} {:>10} {:>10} {:>10}{}", "position error", "mean mm", "rms mm", "max mm",
-                  after.mean_rad ? fmt::format(" {:>10}", "mean deg") : "");
-  std::string text = painted(head, Colour::head, STDOUT_FILENO) + "\n";
+                  s.mean_rad ? fmt::format(" {:>10}", "mean deg") : "");
+  return painted(head, Colour::head, STDOUT_FILENO) + "\n";
+}
+
+}  // namespace
+
+std::string accuracy_table(const ErrorStatistics& corrected) {
+  return head_line(corrected) + line("corrected", corrected);
+}
+
+std::string accuracy_table(const Before& before, const ErrorStatistics& after) {
+  std::string text = head_line(after);
   text += line("before, nominal frames", before.nominal_frames) + "\n";
   if (before.fitted_frames) text += line("before, fitted frames", *before.fitted_frames) + "\n";
   const ErrorStatistics& then = before.fitted_frames ? *before.fitted_frames : before.nominal_frames;

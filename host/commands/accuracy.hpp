@@ -20,6 +20,9 @@ nlohmann::ordered_json to_json(const Before& before);
 /// The three or two lines of a table: before (nominal frames, fitted frames) and after.
 std::string accuracy_table(const Before& before, const ErrorStatistics& after);
 
+/// The same of an arm that was driven with corrected commands: one line.
+std::string accuracy_table(const ErrorStatistics& corrected);
+
 /// Says where rows do not count in full: their lines, the first eight of them.
 void add_outlier_warning(std::vector<std::string>& warnings, const std::string& data,
                          const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers);

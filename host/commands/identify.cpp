@@ -135,8 +135,10 @@ std::string repeats_text(const PureError& e) {
   if (e.sigma_orientation_rad > 0) text += fmt::format(" and {:.4f} deg", degrees(e.sigma_orientation_rad));
   text += fmt::format(", {:.3g} times the declared noise", std::sqrt(e.chi2_per_dof_whitened));
   if (e.lack_of_fit_p) {
-    text += fmt::format("; the model {} (lack of fit p = {:.2g})",
-                        *e.lack_of_fit_p < 0.01 ? "misses more than that" : "misses no more than that",
+    // Two repeats never show much: that they show nothing does not mean that there is nothing.
+    text += fmt::format("; {} (lack of fit p = {:.2g})",
+                        *e.lack_of_fit_p < 0.01 ? "the model misses more than that"
+                                                : "they do not show that the model misses more",
                         *e.lack_of_fit_p);
   }
   return text;

@@ -23,6 +23,7 @@ struct Validate {
   std::string calibration;
   std::string data;
   std::string report;
+  bool corrected = false;
   bool force = false;
 
   void run() const;
@@ -35,6 +36,14 @@ void Validate::run() const {
   std::vector<std::string> warnings = file.warnings;
   const std::vector<Observation> rows = observe(file, robot_file, &warnings);
   common.warn(warnings);
+  if (corrected) {
+    const ErrorStatistics left = errors_of_corrected(robot_file, set, rows);
+    common.say(fmt::format("{}: {} rows of {}, driven with commands that {} corrected", data, rows.size(),
+                           robot_file.name, calibration));
+    common.say(accuracy_table(left));
+    common.write_json({{"corrected", to_json(left)}, {"poses", rows.size()}});
+    return;
+  }
   const Validation v = validate(robot_file, set, rows, data);
   common.say(fmt::format("{}: {} rows of {} with {}", data, rows.size(), robot_file.name, calibration));
   common.say(accuracy_table(v.before, v.after));
@@ -64,11 +73,19 @@ void add_validate(CLI::App& app) {
   command->add_option("--data", options->data, "Measured data that were not fitted [deg, mm]")
       ->type_name("V.csv")
       ->required();
-  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
+  CLI::Option* report = command->add_option("--report", options->report, "Self-contained page of the result")
+                            ->type_name("F.html");
+  command
+      ->add_flag(
+          "--corrected", options->corrected,
+          "The arm was driven with corrected commands; the joints of the data are those that the program "
+          "wanted: how far is it from the drawing, in the frames of the calibration?")
+      ->excludes(report);
   add_force_option(*command, options->force);
   options->common.add_to(*command);
   command->footer(
-      "Example:\n  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data others.csv\n"
+      "Examples:\n  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data others.csv\n"
+      "  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data driven.csv --corrected\n"
       "Exit status 5: the error after is not below the error before, or chi-square per degree of freedom "
       "lies outside its 99.9 % interval.");
   command->callback([options] { options->run(); });

@@ -60,6 +60,14 @@ std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibratio
   return residuals(estimate_of(calibration), *model, rows);
 }
 
+ErrorStatistics errors_of_corrected(const RobotFile& robot, const Calibration& calibration,
+                                    const std::vector<Observation>& rows) {
+  const auto nominal = prepare(TermSet(), robot, robot.path);
+  Estimate frames = estimate_of(calibration);
+  frames.set = TermSet();
+  return statistics(residuals(frames, *nominal, rows), rows);
+}
+
 Validation validate(const RobotFile& robot, const Calibration& calibration,
                     const std::vector<Observation>& rows, const std::string& source) {
   Validation out;

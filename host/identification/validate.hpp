@@ -29,6 +29,11 @@ struct Validation {
 Validation validate(const RobotFile& robot, const Calibration& calibration,
                     const std::vector<Observation>& rows, const std::string& source);
 
+/// Rows of an arm that was driven with corrected commands while their joints are those that the program wanted: what is
+/// left against the drawing, in the frames of the calibration. Nothing is fitted.
+ErrorStatistics errors_of_corrected(const RobotFile& robot, const Calibration& calibration,
+                                    const std::vector<Observation>& rows);
+
 /// Residuals of rows against a calibration, in its frames.
 std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibration& calibration,
                                         const std::vector<Observation>& rows);
