@@ -26,6 +26,7 @@ void give_hint(const std::string& text) {
 }
 
 int give_up(ExitStatus s, const std::exception& e) {
+  std::fflush(stdout);  // in one file the message stands behind what it is about
   fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), e.what());
   give_hint(hint(e));
   return status(s);

@@ -26,6 +26,7 @@ void CommonOptions::say(const std::string& text) const {
 }
 
 void CommonOptions::warn(const std::vector<std::string>& warnings) const {
+  std::fflush(stdout);  // in one file a warning stands where it was said
   for (const std::string& w : warnings)
     fmt::print(stderr, "{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w);
 }

@@ -63,6 +63,20 @@ with open("tracker.txt", "w") as f:
     for k, r in enumerate(rows): f.write("A::Poses::P%d %s %s %s\n" % (k, r["x_mm"], r["y_mm"], r["z_mm"]))
 with open("map.yaml", "w") as f:
     f.write("name: point\njoints:\n" + "".join("  - {column: q%d_deg, unit: deg, sign: 1, offset_deg: 0}\n" % j for j in range(1, 7)))
+# An arm that a controller corrects: the tracker's poses are those of the corrected commands, the joints those of the program.
+done("flexcomp compensate --robot tx60l.yaml --calibration cal.yaml --targets others.csv -o corrected.csv --quiet")
+wanted, driven = list(csv.DictReader(open("others.csv"))), list(csv.DictReader(open("corrected.csv")))
+joints = ["q%d_deg" % j for j in range(1, 7)]
+def table(name, rows):
+    with open(name, "w") as f: f.write("\n".join([",".join(rows[0])] + [",".join(r.values()) for r in rows]) + "\n")
+table("commands.csv", [{**w, **{q: d[q] for q in joints}} for w, d in zip(wanted, driven)])
+done("flexcomp predict --robot tx60l.yaml --calibration truth.yaml --joints commands.csv -o there.csv --quiet")
+pose = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
+table("driven.csv", [{**w, **{k: t[k] for k in pose}} for w, t in zip(wanted, csv.DictReader(open("there.csv")))])
+def left(data):
+    done("flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data %s --corrected --json left.json --quiet" % data)
+    return json.load(open("left.json"))["corrected"]["mean_mm"]
+if not left("driven.csv") < 0.1 or not left("others.csv") > 1: fail("--corrected", left("driven.csv"), left("others.csv"))
 open("kr6_cal.yaml", "w").write("geometric: [{link: 2, a_mm: 0.3, theta_deg: 0.02}]\n")
 open("weld.src", "w").write("DEF WELD( )\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\nPTP {A1 10,A2 -80,A3 95,A4 5,A5 40,A6 20}\nEND\n")
 
