@@ -18,6 +18,16 @@ static int send_frame(void* user, uint16_t id, const uint8_t* bytes, uint8_t siz
   return 1;
 }
 
+/* Yours: takes the next frame out of the queue that your CAN interrupt fills; 0 where there is none. */
+static int receive_frame(uint16_t* id, uint8_t bytes[8], size_t* size) {
+  static volatile int frames_waiting; /* nothing is connected to the emulated board */
+  if (frames_waiting == 0) return 0;
+  *id = 0;
+  bytes[0] = 0;
+  *size = 1;
+  return 1;
+}
+
 /* Yours: the timer interrupt. Here main() calls it. */
 static flexcomp_status every_millisecond(flexcomp_real q_rad[FLEXCOMP_JOINTS]) {
   return flexcomp_step(arm, q_rad, NULL, q_rad); /* the command of your planner in, that for the drives out */
@@ -25,6 +35,9 @@ static flexcomp_status every_millisecond(flexcomp_real q_rad[FLEXCOMP_JOINTS]) {
 
 int main(void) {
   uint32_t now_ms;
+  uint16_t id;
+  uint8_t bytes[8];
+  size_t size;
   flexcomp_status status = FLEXCOMP_REFUSED;
   arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, NULL, &flexcomp_slots_in_ram);
   if (arm == NULL) return 1;
@@ -37,7 +50,8 @@ int main(void) {
     flexcomp_real q_rad[FLEXCOMP_JOINTS] = {0.1f, -0.2f, 1.2f, 0.3f, 0.4f, 0.5f};
     status = every_millisecond(q_rad);
     flexcomp_poll(arm, now_ms);
-    flexcomp_can_poll(can, now_ms); /* and flexcomp_can_receive() for each frame that came in */
+    while (receive_frame(&id, bytes, &size)) flexcomp_can_receive(can, id, bytes, size);
+    flexcomp_can_poll(can, now_ms);
   }
   return status == FLEXCOMP_NO_SET ? 0 : 3; /* nobody has pushed a set yet */
 }
