@@ -97,6 +97,6 @@ printf 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg\n1,2,3,4,5\n' >short.csv
 refused "q6_deg" "$bin"/flexcomp-plant where --robot "$tx60l" --truth all.yaml --joints short.csv --nominal short.csv -o x.csv
 "$bin"/flexcomp-plant measure --robot "$tx60l" --truth all.yaml --poses 2 -o two.csv >/dev/null
 "$bin"/flexcomp-plant measure --robot "$tx60l" --truth all.yaml --poses 3 -o three.csv >/dev/null
-refused "three.csv has 3 rows" "$bin"/flexcomp-plant session --robot "$tx60l" --truth all.yaml --joints two.csv --nominal three.csv \
+refused "three.csv has 3" "$bin"/flexcomp-plant session --robot "$tx60l" --truth all.yaml --joints two.csv --nominal three.csv \
   --points x.txt --log x.csv
 exit "$failed"
