@@ -42,6 +42,9 @@ std::string of_input(const InputError& e) {
   }
   if (e.expected().starts_with("XML") && !e.file().ends_with(".urdf") && !e.file().ends_with(".xml"))
     return "an instrument's points become data with --joints LOG.csv --robot ROBOT.yaml";
+  if (expects("points that are also in"))
+    return "--names takes the points' names apart, as --names '*::{pose}_{reflector}'; --join order asks for "
+           "none";
   if (expects("look like radians") || e.found().find("look like radians") != std::string::npos)
     return "\"flexcomp import --joint-unit rad\" reads a log in radians";
   return {};

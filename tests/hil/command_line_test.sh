@@ -208,6 +208,7 @@ code, said, warned = run(plan)
 if "[#" in said + warned or "\r" in said + warned: fail("a bar in a pipe")
 
 # --- hints
+open("reflectors.txt", "w").write("// Units: mm\nA::P0_a 1 2 3\nA::P0_b 1 2 4\nA::P0_c 1 3 3\n")
 for command, status, says in (
         ("flexcomp identfy --robot x", 2, 'did you mean "flexcomp identify"'),
         ("flexcomp", 2, '"flexcomp --help" lists'),
@@ -216,6 +217,7 @@ for command, status, says in (
         ("flexcomp identify --robot tx60.yaml --data measured.csv -o x.yaml", 3, "hint: there is tx60l.yaml"),
         ("flexcomp identify --robot tx60l.yaml --data log.csv -o x.yaml", 3, "flexcomp import --joints"),
         ("flexcomp import tracker.txt -o x.yaml", 3, "--joints LOG.csv"),
+        ("flexcomp import reflectors.txt --joints log.csv --robot tx60l.yaml -o x.csv", 3, "{pose}_{reflector}"),
         ("flexcomp status --of modbus-tcp:127.0.0.1:%d:1" % port, 4, "reachable"),
         ("flexcomp status --of can:nocan9:3", 4, "hint: "),
         ("flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data slipped.csv", 5, "flexcomp diagnose")):
