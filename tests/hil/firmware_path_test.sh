@@ -16,7 +16,7 @@ PYTHONPATH=$source/tests/hil PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - "$sour
 import shown, sys
 root = sys.argv[1]
 text = open(root + "/docs/firmware.md", encoding="utf-8").read()
-failed, _ = shown.run(text, least=10)
+failed, _ = shown.run(text, least=10, seconds=540)
 failed |= shown.links(text, root + "/docs")
 sys.exit(failed)
 PYTHON
