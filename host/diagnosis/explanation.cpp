@@ -561,7 +561,8 @@ std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution,
     const Block& block = system.blocks[b];
     if (same_name(block.id, id) || is_function(block)) continue;
     const double delta = solution.gain - (base + gains[b]);
-    if (!(delta < telling_bic)) continue;
+    // A rival is better than nothing.
+    if (!(delta < telling_bic) || !(gains[b] > 0)) continue;
     const auto known =
         std::find_if(rivals.begin(), rivals.end(), [&](const Rival& r) { return same_name(r.id, block.id); });
     if (known == rivals.end()) {
