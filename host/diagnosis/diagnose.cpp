@@ -417,7 +417,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     out.doubts.push_back(
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
-  const bool changed = !out.effects.empty() || unnamed;
+  const bool changed = !found.pieces.empty();
   if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))
     out.doubts.push_back("the error after is not below the error before");
