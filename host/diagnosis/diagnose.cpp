@@ -88,14 +88,14 @@ struct Answer {
 using Tell = std::function<void(const std::string&, double)>;
 
 Answer answer_for(const RobotFile& robot, const std::vector<Observation>& rows, const ContextColumns& columns,
-                  Start start, const Tell& tell, double done) {
+                  Start start, bool poses_scatter, const Tell& tell, double done) {
   Answer out;
   out.rows = std::make_unique<const std::vector<Observation>>(rows);
   out.start = std::move(start);
   const Estimate& at = out.start.fit.estimate;
   const Unknowns& fitted = out.start.fitted;
-  out.explainer =
-      std::make_unique<const Explainer>(robot, *out.rows, columns, at, fitted, out.start.fit.weight);
+  out.explainer = std::make_unique<const Explainer>(robot, *out.rows, columns, at, fitted,
+                                                    out.start.fit.weight, poses_scatter);
   out.found = out.explainer->explain(
       [&](double share) { tell("searching the catalogue", done + (0.6 - done) * share); });
   tell("the model with what was found", 0.6);
@@ -157,7 +157,7 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
   if (scattered.places.empty()) return;
   const auto under = [&] {
     Start start{scattered.fit, at_first.fitted};
-    return answer_for(robot, scattered.rows, columns, std::move(start), tell, 0.6);
+    return answer_for(robot, scattered.rows, columns, std::move(start), true, tell, 0.6);
   };
   Answer other = under();
   // The scatter was that of everything at first: what was named is no scatter, and less scatter lets more be named.
@@ -293,7 +293,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   out.noise_floor_m = noise_floor(rows);
 
   const Start at_first = start;
-  Answer answer = answer_for(robot, rows, options.columns, std::move(start), tell, 0.1);
+  Answer answer = answer_for(robot, rows, options.columns, std::move(start), false, tell, 0.1);
   if (answer.found.unnamed) prefer_scatter(answer, robot, rows, at_first, options.columns, tell);
   const Explainer& explainer = *answer.explainer;
   const Explanation& found = answer.found;
@@ -391,6 +391,19 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   const bool unnamed = found.unnamed;
   out.verdict = unnamed ? Verdict::unnamed : out.effects.empty() ? Verdict::none : Verdict::named;
   if (!out.where && !out.effects.empty()) out.where = misfit_of(out.effects.front(), out.places);
+  for (const Piece& piece : found.pieces) {
+    if (!piece.local) continue;
+    const Eigen::VectorXd inside = local_values(*piece.local, rows);
+    std::vector<std::size_t> lines;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      if (inside[static_cast<Eigen::Index>(k)] > 0.1) lines.push_back(rows[k].line);
+    }
+    if (lines.size() > 3) continue;
+    out.notes.push_back(
+        fmt::format("{} rests on {} (line {}): measure more poses with joint {} near {:.0f} deg",
+                    name(piece.id), lines.size() == 1 ? "one row" : fmt::format("{} rows", lines.size()),
+                    fmt::join(lines, ", "), piece.local->joint, degrees(piece.local->centre_rad)));
+  }
   for (const std::string& note : found.notes) out.notes.push_back(note);
   if (!out.outliers.empty())
     out.notes.push_back(
@@ -404,7 +417,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     out.doubts.push_back(
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
-  const bool changed = !out.effects.empty() || unnamed;
+  const bool changed = !found.pieces.empty();
   if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))
     out.doubts.push_back("the error after is not below the error before");

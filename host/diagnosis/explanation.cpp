@@ -202,7 +202,7 @@ bool same_names(const Explanation& a, const Explanation& b) {
 
 Explainer::Explainer(const RobotFile& robot, const std::vector<Observation>& rows,
                      const ContextColumns& columns, const Estimate& start, const Unknowns& fitted,
-                     const std::vector<double>& weight)
+                     const std::vector<double>& weight, bool poses_scatter)
     : robot_(robot),
       rows_(rows),
       start_(start),
@@ -211,7 +211,8 @@ Explainer::Explainer(const RobotFile& robot, const std::vector<Observation>& row
       can_(testable(rows, columns)),
       candidates_(candidates(robot, rows, columns, start.set)),
       variables_(variables(rows, can_)),
-      left_out_(rows) {
+      left_out_(rows),
+      least_touched_(poses_scatter ? 2 : 1) {
   if (counts_.size() != rows.size()) counts_.assign(rows.size(), true);
 }
 
@@ -266,7 +267,7 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   SubsetSearch& search = *out.search;
   Scanned scanned;
   const auto scan = [&](const Remainder& left, std::size_t per_joint) {
-    add_locals(system, scanned, local_curves(system, left, rows_, per_joint), rows_);
+    add_locals(system, scanned, local_curves(system, left, rows_, per_joint, least_touched_), rows_);
     if (slip_candidate < candidates_.list.size())
       add_slips(system, slips(system, left, rows_, point, 2), rows_, point, slip_candidate, slip_parameters);
     search.extend();
@@ -513,7 +514,7 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
       Refit other_refit;
       Explanation other = settle(counts, other_refit);
       const double other_price = price(other, other_refit);
-      if (other_price < best_price - margin) {
+      if (other_price < best_price) {
         best = std::move(other);
         best_price = other_price;
         refit = std::move(other_refit);
@@ -560,7 +561,8 @@ std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution,
     const Block& block = system.blocks[b];
     if (same_name(block.id, id) || is_function(block)) continue;
     const double delta = solution.gain - (base + gains[b]);
-    if (!(delta < telling_bic)) continue;
+    // A rival is better than nothing.
+    if (!(delta < telling_bic) || !(gains[b] > 0)) continue;
     const auto known =
         std::find_if(rivals.begin(), rivals.end(), [&](const Rival& r) { return same_name(r.id, block.id); });
     if (known == rivals.end()) {

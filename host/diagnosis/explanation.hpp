@@ -49,8 +49,10 @@ class Explainer {
  public:
   /// \param start   the fitted model to begin with; \param fitted  what of it the rows can move
   /// \param weight  per row, of that fit
+  /// \param poses_scatter  rows differ from pose to pose anyhow: then one row alone shows no local fault
   Explainer(const RobotFile& robot, const std::vector<Observation>& rows, const ContextColumns& columns,
-            const Estimate& start, const Unknowns& fitted, const std::vector<double>& weight);
+            const Estimate& start, const Unknowns& fitted, const std::vector<double>& weight,
+            bool poses_scatter = false);
 
   const std::vector<NotTestable>& not_testable() const { return candidates_.not_testable; }
   const CandidateSet& candidate_set() const { return candidates_; }
@@ -80,6 +82,7 @@ class Explainer {
   CandidateSet candidates_;
   std::vector<Variable> variables_;
   LeftOutPoses left_out_;
+  std::size_t least_touched_;
 };
 
 bool same_names(const Explanation& a, const Explanation& b);

@@ -131,7 +131,8 @@ Eigen::VectorXd local_values(const LocalCurve& curve, const std::vector<Observat
 }
 
 std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& left,
-                                     const std::vector<Observation>& rows, std::size_t per_joint) {
+                                     const std::vector<Observation>& rows, std::size_t per_joint,
+                                     std::size_t least_touched) {
   std::vector<LocalCurve> chosen;
   const double log_n = std::log(std::max(2.0, system.numbers));
   for (unsigned joint = 1; joint <= joint_count; ++joint) {
@@ -166,8 +167,7 @@ std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& l
         if (centre - 2 * spacing < -pi) visit(centre - 2 * spacing + 2 * pi, pi + 1e-9);
         if (centre + 2 * spacing > pi) visit(-pi - 1e-9, centre + 2 * spacing - 2 * pi);
         const double norm = square - w.squaredNorm();
-        // One pose is no curve: nothing says that it is this joint's reading that it follows.
-        if (touched < 2 || !(norm > 0.05 * square)) continue;
+        if (touched < least_touched || !(norm > 0.05 * square)) continue;
         all.push_back({joint, knots, centre, b * b / norm / left.noise_scale2 - 2 * log_n});
       }
     }

@@ -35,7 +35,7 @@ Remainder remainder(const GapSystem& system);
 std::vector<PlaceShare> place_shares(const GapSystem& system, const Remainder& left);
 
 /// Best local faults of each joint: one cubic B-spline of the reading on a knot spacing of 2 pi / M, wherever it fits;
-/// `per_joint` of them, apart from each other.
+/// `per_joint` of them, apart from each other, each at `least_touched` rows or more.
 struct LocalCurve {
   unsigned joint = 0;  ///< from 1
   std::size_t knots = 0;
@@ -43,7 +43,8 @@ struct LocalCurve {
   double gain = 0;  ///< over two parameters: size and centre
 };
 std::vector<LocalCurve> local_curves(const GapSystem& system, const Remainder& left,
-                                     const std::vector<Observation>& rows, std::size_t per_joint);
+                                     const std::vector<Observation>& rows, std::size_t per_joint,
+                                     std::size_t least_touched);
 /// The spline of a local curve at every row.
 Eigen::VectorXd local_values(const LocalCurve& curve, const std::vector<Observation>& rows);
 

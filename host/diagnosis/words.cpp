@@ -63,8 +63,9 @@ std::string curve_size(const KeyedCoefficients& c) {
   for (const EffectCoefficient& v : c.values) {
     low = std::min(low, v.value);
     high = std::max(high, v.value);
-    sigmas.push_back(v.sigma);
+    if (std::isfinite(v.sigma)) sigmas.push_back(v.sigma);  // of a local fault only those near it are fitted
   }
+  if (sigmas.empty()) sigmas.push_back(std::nan(""));
   std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2),
                    sigmas.end());
   return fmt::format(
@@ -245,7 +246,8 @@ std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calib
   }
   if (!d.doubts.empty()) {
     steps.push_back(fmt::format("{} is not to be pushed: see why below", calibration));
-  } else if (d.verdict == Verdict::unnamed) {
+  } else if (std::any_of(d.after.terms.terms.begin(), d.after.terms.terms.end(),
+                         [](const Term<double>& t) { return t.effect == Effect::unnamed; })) {
     steps.push_back(
         fmt::format("into the controller: flexcomp push --to BUS {} --allow-unnamed (an effect that nobody "
                     "understands is pushed only if you say so)",

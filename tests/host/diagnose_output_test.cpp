@@ -233,7 +233,10 @@ TEST(DiagnosisWords, NextStepsFollowTheVerdict) {
   d.telling_poses.resize(2);
   EXPECT_THAT(text(""), HasSubstr("--plan POSES.csv"));
   EXPECT_THAT(text("p.csv"), HasSubstr("measure the poses of p.csv"));
+  // A place that scatters has no term; a smooth function has.
   d.verdict = Verdict::unnamed;
+  EXPECT_THAT(text(""), Not(HasSubstr("--allow-unnamed")));
+  d.after.terms.terms.back().effect = Effect::unnamed;
   EXPECT_THAT(text(""), HasSubstr("--allow-unnamed"));
   d.doubts = {"the error did not shrink"};
   EXPECT_THAT(text(""), HasSubstr("cal2.yaml is not to be pushed"));
