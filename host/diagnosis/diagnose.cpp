@@ -68,9 +68,7 @@ double declared_chi2(const std::vector<double>& weight, const std::vector<RowRes
                      const std::vector<Observation>& rows) {
   double sum = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    Vector6<double> e;
-    e << residual[k].position_m, residual[k].orientation_rad;
-    if (weight[k] >= 1) sum += (rows[k].whitening * e).squaredNorm();
+    if (weight[k] >= 1) sum += whitened(rows[k], residual[k]).squaredNorm();
   }
   return sum;
 }
@@ -82,7 +80,6 @@ struct Answer {
   std::unique_ptr<const Explainer> explainer;
   Explanation found;
   Refit refit;
-  std::vector<PlaceShare> places, places_left;  ///< of the start, and with what was found
 };
 
 using Tell = std::function<void(const std::string&, double)>;
@@ -108,9 +105,6 @@ Answer answer_for(const RobotFile& robot, const std::vector<Observation>& rows, 
     if (same) break;
     out.refit = refit_with(robot, *out.rows, at, fitted, out.found);
   }
-  const SubsetSearch& search = *out.found.search;
-  out.places = place_shares(*out.found.system, remainder(search, search.score({})));
-  out.places_left = place_shares(*out.found.system, remainder(search, out.found.solution));
   return out;
 }
 
@@ -146,15 +140,18 @@ double price(const Answer& answer) {
 /// What is left over after the names may be a place that moves from pose to pose. Then the numbers of a row are not
 /// independent, and names that are judged as if they were take chance for structure: judged anew under that noise, and
 /// the better of the two answers stands.
-void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Observation>& rows,
-                    const Start& at_first, const ContextColumns& columns, const Tell& tell) {
+/// \param places  shares of the misfit at the start
+/// \return whether it is the one with a place that moves
+bool prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Observation>& rows,
+                    const Start& at_first, const ContextColumns& columns,
+                    const std::vector<PlaceShare>& places, const Tell& tell) {
   // Many rows bear a little scatter without taking it for structure, and each answer takes its time.
-  const bool many = rows.size() > 300;
-  if (many && answer.found.search->noise_scale2() < 1.5) return;
+  const bool many = rows.size() > most_few_rows;
+  if (many && answer.found.search->noise_scale2() < 1.5) return false;
   tell("what moves from pose to pose", 0.6);
   ScatteredModel scattered =
       scattered_model(robot, rows, at_first.fit.estimate, at_first.fitted, at_first.fit.weight);
-  if (scattered.places.empty()) return;
+  if (scattered.places.empty()) return false;
   const auto under = [&] {
     Start start{scattered.fit, at_first.fitted};
     return answer_for(robot, scattered.rows, columns, std::move(start), true, tell, 0.6);
@@ -175,13 +172,13 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
   }
   const double cost =
       scattered.log_determinant + static_cast<double>(scattered.places.size()) * answer.found.search->log_n();
-  if (price(other) + cost >= price(answer)) return;
+  if (price(other) + cost >= price(answer)) return false;
   const Scatter& most = scattered.places.front();
   Misfit m;
   m.place = most.place;
   m.joint = m.place.body >= 1 && m.place.body <= joint_count ? m.place.body : 0;
   m.p_value = std::exp(-0.5 * most.gain);
-  for (const PlaceShare& share : answer.places) {
+  for (const PlaceShare& share : places) {
     if (share.place == m.place) m.explains = share.explains;
   }
   other.found.unnamed = true;
@@ -199,9 +196,8 @@ void prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
       other.found.notes.push_back(fmt::format("{} would look like this; to test it record {}",
                                               effect_name(n.effect), fmt::join(n.needs, ", ")));
   }
-  other.places = std::move(answer.places);
-  other.places_left = places_left_at(other.refit, robot, rows);
   answer = std::move(other);
+  return true;
 }
 
 /// Probability that chance gains as much anywhere in the catalogue: poses are permuted, freely and in blocks of
@@ -211,7 +207,7 @@ class ChanceGains {
  public:
   ChanceGains(const SubsetSearch& search, const Remainder& left, std::uint64_t seed) {
     const GapSystem& system = search.system();
-    const std::size_t count = system.rows > 300 ? 100 : 200;
+    const std::size_t count = system.rows > most_few_rows ? 100 : 200;
     std::mt19937_64 random(seed);
     std::vector<std::size_t> live;
     for (std::size_t k = 0; k < system.rows; ++k) {
@@ -294,7 +290,10 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
 
   const Start at_first = start;
   Answer answer = answer_for(robot, rows, options.columns, std::move(start), false, tell, 0.1);
-  if (answer.found.unnamed) prefer_scatter(answer, robot, rows, at_first, options.columns, tell);
+  const SubsetSearch& first = *answer.found.search;
+  out.places = place_shares(first.system(), remainder(first, first.score({})));
+  const bool scatters = answer.found.unnamed &&
+                        prefer_scatter(answer, robot, rows, at_first, options.columns, out.places, tell);
   const Explainer& explainer = *answer.explainer;
   const Explanation& found = answer.found;
   const Refit& refit = answer.refit;
@@ -323,8 +322,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   const SubsetSearch& search = *found.search;
   const Remainder left = remainder(search, found.solution);
   out.dropped = system.dropped;
-  out.places = answer.places;
-  out.places_left = answer.places_left;
+  out.places_left = scatters ? places_left_at(refit, robot, rows) : place_shares(system, left);
   const ChanceGains chance(search, left, options.seed);
   const LeftOutPoses left_out(rows);
   const double all_cv = left_out.chi2_per_number(search, found.solution);

@@ -175,11 +175,7 @@ std::vector<double> row_chi2(const RobotFile& robot, const std::vector<Observati
   const auto model = prepare(estimate.set, robot, "diagnosis");
   std::vector<double> out;
   const std::vector<RowResidual> r = residuals(estimate, *model, rows);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    Vector6<double> e;
-    e << r[k].position_m, r[k].orientation_rad;
-    out.push_back((rows[k].whitening * e).squaredNorm());
-  }
+  for (std::size_t k = 0; k < rows.size(); ++k) out.push_back(whitened(rows[k], r[k]).squaredNorm());
   return out;
 }
 
@@ -306,7 +302,7 @@ Explanation Explainer::search(const Estimate& at, const std::vector<bool>& count
   const std::vector<SmoothFunction> after_names =
       smooth_functions(system, remainder(search, best), variables_, 2);
   functions.insert(functions.end(), after_names.begin(), after_names.end());
-  if (rows_.size() <= 300) {  // of many rows the smooth functions do
+  if (rows_.size() <= most_few_rows) {  // of many rows the smooth functions do
     for (const Subset& names : {Subset(), best.blocks}) {
       const std::vector<SmoothFunction> found =
           bumps(system, remainder(search, search.score(names)), variables_, 2);
@@ -459,7 +455,7 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
   const auto settle = [&](std::vector<bool> counts, Refit& refit) {
     Explanation e = search(at, counts, noise2, nullptr);
     // Of many rows a few outliers more or less change no name.
-    const int rounds = rows_.size() > 300 ? 1 : 3;
+    const int rounds = rows_.size() > most_few_rows ? 1 : 3;
     for (int round = 0; round < rounds; ++round) {
       refit = refit_with(robot_, rows_, start_, fitted_, e);
       const std::vector<bool> now = in_full(refit.fit.weight);
@@ -482,22 +478,20 @@ Explanation Explainer::explain(const std::function<void(double)>& progress) cons
   }
   if (!odd.empty()) {
     std::vector<std::vector<bool>> tries;
-    if (rows_.size() <= 300) tries.emplace_back(rows_.size(), true);
+    if (rows_.size() <= most_few_rows) tries.emplace_back(rows_.size(), true);
     const GapSystem everything =
         gap_system(robot_, rows_, std::vector<bool>(rows_.size(), true), extended(nuisance_of(refit), &best),
                    fitted_, CandidateSet{candidates_.set, {}, {}, {}, false});
     std::vector<bool> aligned;
     std::size_t most = 0;
+    const auto model = prepare(refit.fit.estimate.set, robot_, "diagnosis");
+    const std::vector<RowResidual> r = residuals(refit.fit.estimate, *model, rows_);
     for (std::uint8_t joint = 1; joint <= joint_count; ++joint) {
       const Eigen::VectorXd& u = place_column(everything, {joint, slot::theta}).column;
-      const auto model = prepare(refit.fit.estimate.set, robot_, "diagnosis");
-      const std::vector<RowResidual> r = residuals(refit.fit.estimate, *model, rows_);
       std::vector<bool> counts = in_full(refit.fit.weight);
       std::size_t count = 0;
       for (const std::size_t k : odd) {
-        Vector6<double> e;
-        e << r[k].position_m, r[k].orientation_rad;
-        e = rows_[k].whitening * e;
+        const Vector6<double> e = whitened(rows_[k], r[k]);
         const auto uk = u.segment<6>(6 * static_cast<Eigen::Index>(k));
         const double along = uk.squaredNorm() > 0 ? e.dot(uk) * e.dot(uk) / uk.squaredNorm() : 0;
         if (chi2[k] - along > 30) continue;

@@ -24,6 +24,9 @@ struct Refit;
 /// six numbers, and what it takes to say so of one row among hundreds).
 constexpr double outlier_price = 40;
 
+/// Above so many rows what costs time and is decided by the mass of the rows anyhow is left out.
+constexpr std::size_t most_few_rows = 300;
+
 /// One part of an explanation with what the linear search found for it.
 struct Piece {
   EffectId id;

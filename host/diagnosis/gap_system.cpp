@@ -48,13 +48,6 @@ Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_r
   return out;
 }
 
-Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
-  if (row.has_orientation) return row.whitening.partialPivLu().solve(whitened);
-  Vector6<double> e = Vector6<double>::Zero();
-  e.head<3>() = row.whitening.topLeftCorner<3, 3>().partialPivLu().solve(whitened.head<3>());
-  return e;
-}
-
 const PlaceColumn& place_column(const GapSystem& system, Place place) {
   for (const PlaceColumn& p : system.places) {
     if (p.place == place) return p;

@@ -72,9 +72,6 @@ void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns);
 /// The column of a place times a number per row.
 Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_row);
 
-/// Metres and radians of one row's whitened numbers.
-Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened);
-
 const PlaceColumn& place_column(const GapSystem& system, Place place);
 
 }  // namespace flexcomp::host

@@ -269,9 +269,8 @@ void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
     const std::vector<RowResidual> b = residuals(without, *without_model, rows);
     Eigen::VectorXd shift(6 * static_cast<Eigen::Index>(rows.size()));
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      Vector6<double> e;
-      e << a[k].position_m - b[k].position_m, a[k].orientation_rad - b[k].orientation_rad;
-      shift.segment<6>(6 * static_cast<Eigen::Index>(k)) = rows[k].whitening * e;
+      shift.segment<6>(6 * static_cast<Eigen::Index>(k)) =
+          whitened(rows[k], {a[k].position_m - b[k].position_m, a[k].orientation_rad - b[k].orientation_rad});
     }
     // What geometry and frames would take up is theirs: an axis that tilts once a turn is largely a tilted base.
     shift -= nuisance * (nuisance.transpose() * shift);

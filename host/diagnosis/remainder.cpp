@@ -33,6 +33,13 @@ Scalar scalar(const GapSystem& system, const Remainder& left, const Eigen::Vecto
   return s;
 }
 
+std::vector<Scalar> turns_of_joints(const GapSystem& system, const Remainder& left) {
+  std::vector<Scalar> joints;
+  for (std::uint8_t j = 1; j <= joint_count; ++j)
+    joints.push_back(scalar(system, left, place_column(system, {j, slot::theta}).column));
+  return joints;
+}
+
 double spline(double x) {
   x = std::abs(x);
   if (x < 1) return 2.0 / 3 - x * x + x * x * x / 2;
@@ -387,11 +394,7 @@ std::vector<SmoothFunction> bumps(const GapSystem& system, const Remainder& left
                                   const std::vector<Variable>& of, std::size_t most) {
   constexpr std::array<double, 3> spacings{0.5, 0.8, 1.2};
   const double log_n = std::log(std::max(2.0, system.numbers));
-  std::vector<Scalar> joints;
-  for (unsigned j = 1; j <= joint_count; ++j) {
-    joints.push_back(
-        scalar(system, left, place_column(system, {static_cast<std::uint8_t>(j), slot::theta}).column));
-  }
+  const std::vector<Scalar> joints = turns_of_joints(system, left);
   std::vector<std::vector<Row>> rows_of(of.size());
   for (std::size_t v = 0; v < of.size(); ++v) {
     if (of[v].is_order || of[v].kind != Covariate::reading) continue;
@@ -460,7 +463,6 @@ Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::Vecto
   constexpr double gone = 1e-8;
   const Eigen::Index n = right.size();
   Eigen::VectorXd variance = Eigen::VectorXd::Ones(n);
-  Eigen::VectorXd determined = Eigen::VectorXd::Zero(n);
   gain = 0;
   for (int round = 0; round <= rounds; ++round) {
     // In members of which each has the prior 1: never singular.
@@ -472,7 +474,7 @@ Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::Vecto
     const Eigen::VectorXd scaled = size.asDiagonal() * right;
     const Eigen::VectorXd mean = factor.solve(scaled);
     const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(n, n));
-    determined = 1 - covariance.diagonal().array();
+    const Eigen::VectorXd determined = 1 - covariance.diagonal().array();
     gain = mean.dot(scaled) - 2 * factor.matrixLLT().diagonal().array().log().sum() -
            2 * static_cast<double>((variance.array() > gone).count());
     if (round == rounds) break;
@@ -498,11 +500,7 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Rema
     }
   }
   const double tried = 2 * std::log(static_cast<double>(sets.size() * joint_count * sizes.size()));
-  std::vector<Scalar> joints;
-  for (unsigned j = 1; j <= joint_count; ++j) {
-    joints.push_back(
-        scalar(system, left, place_column(system, {static_cast<std::uint8_t>(j), slot::theta}).column));
-  }
+  const std::vector<Scalar> joints = turns_of_joints(system, left);
   std::vector<SmoothFunction> all;
   for (const std::vector<std::size_t>& set : sets) {
     SmoothFunction kind;

@@ -112,9 +112,7 @@ ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observa
     const std::vector<RowResidual> r = residuals(estimate, *model, rows);
     std::vector<bool> speaks(rows.size(), true);
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      Vector6<double> e;
-      e << r[k].position_m, r[k].orientation_rad;
-      residual.segment<6>(at(k)) = rows[k].whitening * e;
+      residual.segment<6>(at(k)) = whitened(rows[k], r[k]);
       if (k < weights.size() && weights[k] < 1) speaks[k] = false;
     }
     std::vector<PlaceColumn> places = system.places;

@@ -54,6 +54,19 @@ Eigen::Matrix3d rotation_of(const Eigen::Vector3d& w) {
   return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
 }
 
+Vector6<double> whitened(const Observation& row, const RowResidual& residual) {
+  Vector6<double> e;
+  e << residual.position_m, residual.orientation_rad;
+  return row.whitening * e;
+}
+
+Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
+  if (row.has_orientation) return row.whitening.partialPivLu().solve(whitened);
+  Vector6<double> e = Vector6<double>::Zero();
+  e.head<3>() = row.whitening.topLeftCorner<3, 3>().partialPivLu().solve(whitened.head<3>());
+  return e;
+}
+
 std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows) {
   std::vector<RowResidual> out;
@@ -157,9 +170,7 @@ Linearised linearised(const Estimate& estimate, const HostModel& model, const st
     const Eigen::Vector3d lever = at.pose.rotation * (at.loaded.point + estimate.e.position);
     const Eigen::Vector3d point = at.pose.position + lever;
     const RowResidual r = residual_of(estimate, row, at.pose, point);
-    Vector6<double> stacked;
-    stacked << r.position_m, r.orientation_rad;
-    out.residual.segment<6>(6 * k).noalias() = row.whitening * stacked;
+    out.residual.segment<6>(6 * k) = whitened(row, r);
 
     // From a motion of the measured point in the measurement frame to the whitened residual ...
     Matrix6d from_point = row.whitening;

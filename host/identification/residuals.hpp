@@ -46,6 +46,11 @@ struct RowResidual {
   Eigen::Vector3d orientation_rad = Eigen::Vector3d::Zero();
 };
 
+/// W * [e_p; e_R]: unit covariance.
+Vector6<double> whitened(const Observation& row, const RowResidual& residual);
+/// Back to metres and radians.
+Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened);
+
 /// Residuals of all rows, in their order.
 std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows);

@@ -36,11 +36,7 @@ ErrorStatistics statistics(const std::vector<RowResidual>& errors, const std::ve
 
 double chi_square(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows) {
   double sum = 0;
-  for (std::size_t k = 0; k < errors.size(); ++k) {
-    Vector6<double> e;
-    e << errors[k].position_m, errors[k].orientation_rad;
-    sum += (rows[k].whitening * e).squaredNorm();
-  }
+  for (std::size_t k = 0; k < errors.size(); ++k) sum += whitened(rows[k], errors[k]).squaredNorm();
   return sum;
 }
 
