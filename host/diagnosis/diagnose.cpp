@@ -278,7 +278,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     identify_options.force = options.force;
     identify_options.seed = options.seed;
     Identification base = identify(robot, rows, source, identify_options);
-    for (const std::string& d : base.doubts) out.notes.push_back("the model at the start: " + d);
+    for (const std::string& d : base.doubts) out.doubts.push_back("the model at the start: " + d);
     start.fit = std::move(base.fit);
     start.fitted = std::move(base.known.fitted);
     out.before.confounded = base.calibration.confounded;
@@ -415,6 +415,8 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
     out.doubts.push_back(
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
+  if (out.degrees_of_freedom_after < 1)
+    out.doubts.push_back("there are as many unknowns as measured numbers: no effect could show in what is left");
   const bool changed = !found.pieces.empty();
   if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))

@@ -141,6 +141,7 @@ std::string where_sentence(const Misfit& where) {
 
 std::string verdict_sentence(const Diagnosis& d) {
   if (d.verdict == Verdict::none) {
+    if (!d.doubts.empty()) return "Nothing was found, but these data cannot say that nothing is missing.";
     return fmt::format(
         "Nothing is missing: the model explains these data down to their noise{}.",
         d.outliers.empty()

@@ -118,6 +118,12 @@ assert j["verdict"] == "none" and j["effects"] == []
 assert j["gap"]["before"]["holdout_rms_mm"] is None
 PYTHON
 
+# --- too few rows: what fits as well as it must proves nothing ------------------------------------------------------------
+head -n 4 plain.csv >three.csv
+expect 5 "Nothing was found, but these data cannot say that nothing is missing" "these 3 rows cannot know" -- \
+  diagnose --data three.csv -o t.yaml --report t.html
+grep -q "Nothing is missing" t.html && fail "t.html: three rows are said to show that nothing is missing"
+
 # --- without context columns: what could not be asked, and what it needs --------------------------------------------------
 without '^(move|temp|time)' <plain.csv >bare.csv
 head -1 bare.csv | grep -q 'move\|temp' && fail "bare.csv has context"
