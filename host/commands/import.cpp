@@ -82,6 +82,7 @@ void Import::run() const {
     measurements.run(common, source, out);
     return;
   }
+  measurements.refuse_without_joints();
   const bool from_robot_file = is_robot_file(source);
   if (from_robot_file && links_given) {
     throw CLI::ValidationError("--base, --tip, --flange", "are links of a URDF; a robot file has none");
