@@ -36,8 +36,8 @@ std::string nearest_file(const std::string& path) {
   std::string near = nearest(wanted.stem().string(), stems);
   if (!near.empty()) {
     near += wanted.extension().string();
-  } else if (!endings.empty()) {
-    near = wanted.stem().string() + endings.front();
+  } else if (const std::string ending = nearest(wanted.extension().string(), endings); !ending.empty()) {
+    near = wanted.stem().string() + ending;
   }
   return near.empty() ? "" : (wanted.has_parent_path() ? (wanted.parent_path() / near).string() : near);
 }

@@ -61,8 +61,10 @@ std::vector<std::string> checked(const std::string& text, const std::string& bes
   } catch (const InputError& e) {
     std::vector<std::string> of_log = joint_and_context_names(joining.data.columns);
     of_log.insert(of_log.end(), log.context.begin(), log.context.end());
-    const bool measured =
-        !e.field().empty() && std::find(of_log.begin(), of_log.end(), e.field()) == of_log.end();
+    // The field may be several columns, "q1_deg … q6_deg".
+    const bool measured = !e.field().empty() &&
+                          std::none_of(of_log.begin(), of_log.end(),
+                                       [&e](const std::string& name) { return e.field().starts_with(name); });
     const std::vector<std::size_t>& lines = measured ? joining.point_lines : joining.log_lines;
     const std::size_t line = e.line() < 2 ? 0 : lines[e.line() - 2];
     throw InputError(measured ? points.path : log.path, line, e.field(), e.expected(), e.found());

@@ -196,7 +196,7 @@ def complaint(command, option, value):
     return warned if code == 2 and re.search(r"(^|\s)%s: |= %s(\s|$)|%s = " % (option, re.escape(value), option), warned) else ""
 numbers = set()
 for command in commands:
-    for option in re.findall(r"^  (?:-\w,)?(--[a-z][-a-z0-9]*) [A-Z]", done(["flexcomp", command, "--help"]), re.M):
+    for option in re.findall(r"^  (?:-\w,)?(--[a-z][-a-z0-9]*) (?!Excludes:|Needs:)[A-Z]", done(["flexcomp", command, "--help"]), re.M):
         for good, wrong in (("1", "abc"), ("1,1,1,1,1,1", "1,1,abc,1,1,1")):
             if complaint(command, option, good) or not complaint(command, option, wrong): continue
             numbers.add((command, option))
