@@ -60,6 +60,7 @@ std::optional<Unit> find(const std::vector<Named>& units, std::string_view word)
 
 std::vector<std::string> names(const std::vector<Named>& units) {
   std::vector<std::string> out;
+  out.reserve(units.size());
   for (const Named& u : units) out.emplace_back(u.unit.name);
   return out;
 }
@@ -145,11 +146,11 @@ class Declaration {
     return out;
   }
 
-  /// "Units: furlongs".
+  /// "Units: furlongs"; "Units: Metric" says too little, but nothing wrong.
   bool not_understood() const {
     bool words = false;
     for (std::size_t k = begin_; k < tokens_.size(); ++k) {
-      if (is_temperature(k) || is_unit_at(k)) return false;
+      if (is_temperature(k) || is_unit_at(k) || is(k, {"metric", "metrisch"})) return false;
       words = words || (is_word(tokens_[k]) && std::isdigit(static_cast<unsigned char>(tokens_[k][0])) == 0);
     }
     return words && plural_;
