@@ -25,10 +25,11 @@ void give_hint(const std::string& text) {
   if (!text.empty()) fmt::print(stderr, "{} {}\n", painted("hint:", Colour::note, STDERR_FILENO), text);
 }
 
-int give_up(ExitStatus s, const std::exception& e) {
+int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
   std::fflush(stdout);  // in one file the message stands behind what it is about
   fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), e.what());
-  give_hint(hint(e));
+  const std::vector<CLI::App*> commands = app.get_subcommands();
+  give_hint(hint(e, commands.empty() ? "" : commands.front()->get_name()));
   return status(s);
 }
 
@@ -72,12 +73,12 @@ int main(int argc, char** argv) {
     give_hint(usage_hint(app, std::vector<std::string>(argv + 1, argv + argc)));
     return status(ExitStatus::usage);
   } catch (const InputError& e) {
-    return give_up(ExitStatus::input_refused, e);
+    return give_up(ExitStatus::input_refused, e, app);
   } catch (const BusError& e) {
-    return give_up(ExitStatus::bus, e);
+    return give_up(ExitStatus::bus, e, app);
   } catch (const DoubtfulResult& e) {
-    return give_up(ExitStatus::not_trustworthy, e);
+    return give_up(ExitStatus::not_trustworthy, e, app);
   } catch (const std::exception& e) {
-    return give_up(ExitStatus::failed, e);
+    return give_up(ExitStatus::failed, e, app);
   }
 }

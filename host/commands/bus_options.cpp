@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "commands/numbers.hpp"
+
 namespace flexcomp::host {
 
 void BusOptions::add_bus_to(CLI::App& app, const std::string& name) {
@@ -20,7 +22,7 @@ void BusOptions::add_bus_to(CLI::App& app, const std::string& name) {
       ->required()
       ->type_name("BUS");
   app.add_option("--timeout", timeout_s, "How long the controller may keep silent [s]")
-      ->check(CLI::Range(0.05, 3600.0))
+      ->check(number_between(0.05, 3600.0))
       ->capture_default_str();
   add_to(app);
 }

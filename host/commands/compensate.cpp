@@ -14,6 +14,7 @@
 #include "commands/answers.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/numbers.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
@@ -238,12 +239,14 @@ void add_compensate(CLI::App& app) {
                    "Joints where a program begins [deg]: of several ways to a pose the nearest is taken")
       ->delimiter(',')
       ->expected(6)
+      ->check(finite_number())
       ->type_name("Q1,…,Q6");
   command
       ->add_option("--frame", options->frame,
                    "Where F0 is in the frame of a program's poses: x,y,z,rx,ry,rz [mm, deg]")
       ->delimiter(',')
       ->expected(6)
+      ->check(finite_number())
       ->type_name("X,Y,Z,RX,RY,RZ");
   command->add_flag("--allow-unnamed", options->allow_unnamed, "Also use what was found but not understood");
   add_force_option(*command, options->force);

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <memory>
 #include <set>
 #include <string>
@@ -23,8 +25,10 @@ std::vector<std::string> choices_of(CLI::Option& option) {
       for (const char c : text.substr(1)) {
         if (c != ',' && c != '}') {
           word += c;
-        } else if (!word.empty()) {
-          out.push_back(std::move(word));
+        } else {
+          // "," and ";" have names as well, which mean nothing to the shell.
+          if (std::any_of(word.begin(), word.end(), [](unsigned char l) { return std::isalnum(l) != 0; }))
+            out.push_back(word);
           word.clear();
         }
       }
@@ -91,17 +95,23 @@ std::string bash_script(CLI::App& app) {
   }
   return fmt::format(
       R"(# Completion of bash for flexcomp, as "flexcomp completion bash" writes it from its own options.
-_flexcomp_words() {{ mapfile -t COMPREPLY < <(compgen -W "$1" -- "$cur"); }}
+_flexcomp_words() {{ mapfile -t COMPREPLY < <(compgen -P "$before" -W "$1" -- "$cur"); }}
 _flexcomp_files() {{
   local extended=0
   compopt -o filenames 2>/dev/null
   shopt -q extglob || {{ extended=1; shopt -s extglob; }}
-  mapfile -t COMPREPLY < <(compgen -f -X "!$1" -- "$cur"; [[ $1 == '*' ]] || compgen -d -- "$cur")
+  mapfile -t COMPREPLY < <(compgen -P "$before" -f -X "!$1" -- "$cur"
+    [[ $1 == '*' ]] || compgen -P "$before" -d -- "$cur")
   [[ $extended -eq 0 ]] || shopt -u extglob
 }}
 _flexcomp() {{
-  local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}}
+  local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}} before=
   COMPREPLY=()
+  # --option=value comes as three words where "=" is in COMP_WORDBREAKS, as it is by default, else as one.
+  if [[ $cur == = ]]; then cur=
+  elif [[ $prev == = && $COMP_CWORD -gt 2 ]]; then prev=${{COMP_WORDS[COMP_CWORD-2]}}
+  elif [[ $cur == --*=* ]]; then prev=${{cur%%=*}} before=${{cur%%=*}}= cur=${{cur#*=}}
+  fi
   if [[ $COMP_CWORD -eq 1 ]]; then _flexcomp_words "{0} --help --version"; return; fi
   case ${{COMP_WORDS[1]}} in
 {1}  esac

@@ -14,29 +14,41 @@ namespace flexcomp::host {
 
 namespace {
 
-/// The file beside the one that is not there, whose name is nearest.
+/// The file beside the one that is not there, whose name is nearest: a slip in the name or in its ending, not in both, for
+/// endings are alike anyway.
 std::string nearest_file(const std::string& path) {
   namespace fs = std::filesystem;
   const fs::path wanted(path);
   const fs::path folder = wanted.has_parent_path() ? wanted.parent_path() : fs::path(".");
   std::error_code error;
-  std::vector<std::string> names;
+  std::vector<std::string> stems;    // of files with the same ending
+  std::vector<std::string> endings;  // of files with the same stem
+  std::size_t seen = 0;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    if (names.size() > 10000) return {};
-    if (at->is_regular_file(error)) names.push_back(at->path().filename().string());
+    if (++seen > 10000) return {};
+    if (!at->is_regular_file(error)) continue;
+    const fs::path& file = at->path();
+    if (file.extension() == wanted.extension()) stems.push_back(file.stem().string());
+    if (file.stem() == wanted.stem()) endings.push_back(file.extension().string());
   }
-  std::sort(names.begin(), names.end());
-  const std::string near = nearest(wanted.filename().string(), names);
+  std::sort(stems.begin(), stems.end());
+  std::sort(endings.begin(), endings.end());
+  std::string near = nearest(wanted.stem().string(), stems);
+  if (!near.empty()) {
+    near += wanted.extension().string();
+  } else if (const std::string ending = nearest(wanted.extension().string(), endings); !ending.empty()) {
+    near = wanted.stem().string() + ending;
+  }
   return near.empty() ? "" : (wanted.has_parent_path() ? (wanted.parent_path() / near).string() : near);
 }
 
-std::string of_input(const InputError& e) {
+std::string of_input(const InputError& e, const std::string& command) {
   const auto expects = [&e](std::string_view text) { return e.expected().find(text) != std::string::npos; };
   if (expects("a file that can be read") && e.found() == "none") {
     const std::string near = nearest_file(e.file());
     return near.empty() ? "" : fmt::format("there is {}", near);
   }
-  if (expects("this column (") && !e.file().ends_with(".yaml")) {
+  if (expects("this column (") && command != "import" && !e.file().ends_with(".yaml")) {
     return "\"flexcomp import --joints LOG.csv\" makes a data file of an instrument's export and a robot's "
            "log";
   }
@@ -80,8 +92,8 @@ std::string of_bus(const std::string& message, bool silent) {
 
 }  // namespace
 
-std::string hint(const std::exception& error) {
-  if (const auto* input = dynamic_cast<const InputError*>(&error)) return of_input(*input);
+std::string hint(const std::exception& error, const std::string& command) {
+  if (const auto* input = dynamic_cast<const InputError*>(&error)) return of_input(*input, command);
   if (dynamic_cast<const BusError*>(&error) != nullptr) {
     const std::string message = error.what();
     const bool refused = dynamic_cast<const RefusedByController*>(&error) != nullptr;

@@ -10,8 +10,9 @@
 
 namespace flexcomp::host {
 
-/// One line without full stop, or empty where the message says all that can be said.
-std::string hint(const std::exception& error);
+/// One line without full stop, or empty where the message says all that can be said. `command` is the one that failed: what
+/// it does itself is no advice.
+std::string hint(const std::exception& error, const std::string& command);
 
 /// For a command line that was not understood: the nearest command or option, and whose help to read.
 std::string usage_hint(const CLI::App& app, const std::vector<std::string>& arguments);

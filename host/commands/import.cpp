@@ -10,6 +10,7 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/import_measurements.hpp"
+#include "commands/outputs.hpp"
 #include "files/input_error.hpp"
 #include "files/quaternion.hpp"
 #include "files/write_file.hpp"
@@ -79,9 +80,16 @@ void Import::run() const {
     if (links_given || !name.empty())
       throw CLI::ValidationError("--base, --tip, --flange, --name",
                                  "belong to a robot; --joints makes data of points");
+    refuse_same_file({{"FILE", source},
+                      {"--joints", measurements.joints},
+                      {"--robot", measurements.robot},
+                      {"--map", measurements.map}},
+                     {{"--output", out}, {"--json", common.json}});
     measurements.run(common, source, out);
     return;
   }
+  measurements.refuse_without_joints();
+  refuse_same_file({{"FILE", source}}, {{"--output", out}, {"--json", common.json}});
   const bool from_robot_file = is_robot_file(source);
   if (from_robot_file && links_given) {
     throw CLI::ValidationError("--base, --tip, --flange", "are links of a URDF; a robot file has none");

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "commands/numbers.hpp"
 #include "files/data_file.hpp"
 #include "files/declared_unit.hpp"
 #include "files/input_error.hpp"
@@ -18,6 +20,7 @@
 namespace flexcomp::host {
 namespace {
 
+constexpr const char* group_name = "An instrument's points and a robot's log";
 const std::map<std::string, char> delimiter_names{{"comma", ','}, {",", ','},    {"semicolon", ';'},
                                                   {";", ';'},     {"tab", '\t'}, {"blanks", ' '}};
 const std::map<std::string, char> decimal_names{{"point", '.'}, {".", '.'}, {"comma", ','}, {",", ','}};
@@ -40,9 +43,10 @@ std::optional<Value> chosen(const std::map<std::string, Value>& names, const std
   return text.empty() ? std::optional<Value>() : std::optional<Value>(names.at(text));
 }
 
-/// Asks the reader of data files about the text; what it refuses is said with the line of the log that it came from.
+/// Asks the reader of data files about the text; what it refuses is said with the line of the file that it came from.
 std::vector<std::string> checked(const std::string& text, const std::string& beside, const RobotFile& robot,
-                                 const RobotLog& log, const Joining& joining, bool force) {
+                                 const PointList& points, const RobotLog& log, const Joining& joining,
+                                 bool force) {
   const std::string path = fmt::format("{}.check-{}", beside, ::getpid());
   struct Remove {
     const std::string& path;
@@ -55,24 +59,33 @@ std::vector<std::string> checked(const std::string& text, const std::string& bes
   try {
     return load_data(path, robot, {force}).warnings;
   } catch (const InputError& e) {
-    const std::size_t line = e.line() < 2 ? 0 : joining.log_lines[e.line() - 2];
-    throw InputError(log.path, line, e.field(), e.expected(), e.found());
+    std::vector<std::string> of_log = joint_and_context_names(joining.data.columns);
+    of_log.insert(of_log.end(), log.context.begin(), log.context.end());
+    // The field may be several columns, "q1_deg … q6_deg".
+    const bool measured = !e.field().empty() &&
+                          std::none_of(of_log.begin(), of_log.end(),
+                                       [&e](const std::string& name) { return e.field().starts_with(name); });
+    const std::vector<std::size_t>& lines = measured ? joining.point_lines : joining.log_lines;
+    const std::size_t line = e.line() < 2 ? 0 : lines[e.line() - 2];
+    throw InputError(measured ? points.path : log.path, line, e.field(), e.expected(), e.found());
   }
 }
 
 void list(const CommonOptions& common, const std::string& what, const std::vector<std::string>& lonely) {
   if (lonely.empty()) return;
+  constexpr std::size_t most = 20;
   std::string text = fmt::format("  {}: {}", lonely.size(), what);
-  for (const std::string& one : lonely) text += "\n    " + one;
+  for (std::size_t k = 0; k < std::min(most, lonely.size()); ++k) text += "\n    " + lonely[k];
+  if (lonely.size() > most)
+    text += fmt::format("\n    … and {} more (--json lists them all)", lonely.size() - most);
   common.say(text);
 }
 
 }  // namespace
 
 void ImportMeasurements::add_to(CLI::App& command) {
-  const auto group = [](CLI::Option* option) {
-    return option->group("An instrument's points and a robot's log");
-  };
+  this->command = &command;
+  const auto group = [](CLI::Option* option) { return option->group(group_name); };
   group(command.add_option(
             "--joints", joints,
             "Joint readings of the measured poses, a log of the robot: makes data for identify of SOURCE"))
@@ -108,7 +121,7 @@ void ImportMeasurements::add_to(CLI::App& command) {
       ->check(CLI::IsMember(keys_of(decimal_names)));
   group(command.add_option("--coverage", coverage,
                            "The export's uncertainties are so many standard deviations"))
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   group(command.add_option("--join", by,
                            "How points find their joints [default: name, where both files have names]"))
@@ -122,13 +135,33 @@ void ImportMeasurements::add_to(CLI::App& command) {
       ->check(CLI::Range(3, 4));
   group(command.add_flag("--repeats", repeats, "Points of one name are the same pose measured again"));
   group(command.add_option("--tolerance", tolerance_s, "With --join time: how far apart the two may be [s]"))
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->capture_default_str();
   group(command.add_option("--time-shift", shift_s,
                            "With --join time: what to add to the instrument's times [s]"))
+      ->check(finite_number())
       ->capture_default_str();
   group(command.add_flag("--force", force,
                          "Go on where input is only suspicious (readings that look like radians)"));
+}
+
+void ImportMeasurements::refuse_idle() const {
+  const auto refuse = [this](const char* option, const char* join, bool applies) {
+    if (!applies && command->get_option(option)->count() > 0)
+      throw CLI::ValidationError(option, fmt::format("goes with --join {} alone", join));
+  };
+  refuse("--names", "name", by.empty() || by == "name");
+  refuse("--repeats", "name", by.empty() || by == "name");
+  refuse("--reflectors", "order", by == "order");
+  refuse("--tolerance", "time", by == "time");
+  refuse("--time-shift", "time", by == "time");
+}
+
+void ImportMeasurements::refuse_without_joints() const {
+  for (const CLI::Option* option : command->get_options()) {
+    if (option->get_group() == group_name && option->count() > 0)
+      throw CLI::ValidationError(option->get_name(), "is for an instrument's points, with --joints LOG.csv");
+  }
 }
 
 void ImportMeasurements::run(const CommonOptions& common, const std::string& source,
@@ -136,6 +169,7 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   if (robot.empty()) throw CLI::RequiredError("--robot (with --joints)");
   if (!map.empty() && !joint_columns.empty())
     throw CLI::ValidationError("--joint-columns", "is the short form of --map: give one of them");
+  refuse_idle();
   const RobotFile robot_file = load_robot(robot);
   LogMap how = map.empty() ? LogMap() : load_log_map(map);
   if (!joint_unit.empty()) how.joint_unit = angle_unit_of(joint_unit);
@@ -154,7 +188,7 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   const RobotLog log = read_robot_log(joints, how, robot_file);
 
   JoinOptions joining_options;
-  if (by.empty() && !(points.names && log.names)) {
+  if (by.empty() && !(points.names && (log.names || !log.doubtful_names.empty()))) {
     throw InputError(points.names ? log.path : points.path, 0, "--join",
                      "order or time, for the points cannot be joined by name", "no column with names");
   }
@@ -166,7 +200,7 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   joining_options.shift_s = shift_s;
   const Joining joining = join(points, log, joining_options);
   const std::string text = data_text(joining.data);
-  common.warn(checked(text, out, robot_file, log, joining, force));
+  common.warn(checked(text, out, robot_file, points, log, joining, force));
   write_file(out, text);
 
   const char* const kind = joining.data.kind == MeasurementKind::reflectors ? "reflector points"

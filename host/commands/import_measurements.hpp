@@ -33,9 +33,17 @@ struct ImportMeasurements {
   double shift_s = 0;
   bool force = false;
 
+  const CLI::App* command = nullptr;
+
   void add_to(CLI::App& command);
   bool asked() const { return !joints.empty(); }
+  /// \throws CLI::ValidationError  an option of this half without --joints
+  void refuse_without_joints() const;
   void run(const CommonOptions& common, const std::string& source, const std::string& out) const;
+
+ private:
+  /// \throws CLI::ValidationError  an option that belongs to another --join
+  void refuse_idle() const;
 };
 
 }  // namespace flexcomp::host

@@ -17,6 +17,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/numbers.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/cell_file.hpp"
@@ -658,7 +659,7 @@ void add_plan(CLI::App& app) {
       ->add_option("--payloads", options->payloads,
                    "Payloads to choose from at each pose [kg], at the robot file's centre of mass")
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->type_name("KG,KG,…");
   command
       ->add_option("--measure", options->measure,
@@ -675,7 +676,7 @@ void add_plan(CLI::App& app) {
   command
       ->add_option("--effort", options->effort,
                    "How long to search: 1 is about a second of work for refine; 10 is ten times that")
-      ->check(CLI::Range(0.001, 1e4))
+      ->check(number_between(0.001, 1e4))
       ->capture_default_str();
   command
       ->add_option("--state", options->state,

@@ -15,6 +15,7 @@
 #include "commands/bus_options.hpp"
 #include "commands/colour.hpp"
 #include "commands/commands.hpp"
+#include "commands/numbers.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
@@ -248,7 +249,7 @@ void add_push(CLI::App& app) {
   command
       ->add_option("--trial", state->trial_s,
                    "On trial: the set before comes back unless confirmed within this time [s]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_flag("--confirm", state->confirm, "Keep the set that runs on trial; no CAL.yaml then");
   command->add_flag("--allow-unnamed", state->allow_unnamed, "Also push what was found but not understood");
   command->add_flag(

@@ -11,6 +11,7 @@
 #include "catalogue/catalogue.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/numbers.hpp"
 #include "files/calibration_file.hpp"
 #include "files/csv.hpp"
 #include "files/input_error.hpp"
@@ -193,7 +194,8 @@ void add_report(CLI::App& app) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("--title", options->title, "Heading");
   command->add_option("--summary", options->summary, "A sentence below it");
-  command->add_option("--noise-floor-mm", options->noise_floor_mm, "Drawn into the plots of errors");
+  command->add_option("--noise-floor-mm", options->noise_floor_mm, "Drawn into the plots of errors")
+      ->check(non_negative_number());
   command->add_option("-o,--output", options->out, "Page to write")->type_name("F.html")->required();
   options->common.add_to(*command);
   command->footer(

@@ -11,6 +11,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/numbers.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/input_error.hpp"
@@ -195,7 +196,7 @@ void add_simulate(CLI::App& app) {
       ->add_option("--payloads", options->payloads,
                    "Payloads in turn [kg], at the robot file's centre of mass")
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->type_name("KG,KG,…")
       ->excludes(joints);
   command
@@ -213,6 +214,7 @@ void add_simulate(CLI::App& app) {
                    "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg]")
       ->delimiter(',')
       ->expected(6)
+      ->check(finite_number())
       ->type_name("X,Y,Z,RX,RY,RZ");
   command->add_option("-o,--output", options->out, "Data file")->type_name("D.csv")->required();
   options->common.add_seed_to(*command);

@@ -39,13 +39,46 @@ std::optional<std::string_view> without_comment_mark(std::string_view line) {
   return {};
 }
 
-std::vector<Line> lines_of(std::string_view text) {
+bool is_utf8(std::string_view text) {
+  for (std::size_t k = 0; k < text.size();) {
+    const auto c = static_cast<unsigned char>(text[k++]);
+    // Two bytes from 0xC2, three from 0xE0, four up to 0xF4.
+    std::size_t more = c < 0x80 ? 0 : c >= 0xC2 && c < 0xE0 ? 1 : c >= 0xE0 && c < 0xF0 ? 2 : 3;
+    if (more == 3 && (c < 0xF0 || c > 0xF4)) return false;
+    for (; more > 0; --more, ++k) {
+      if (k >= text.size() || (static_cast<unsigned char>(text[k]) & 0xC0U) != 0x80U) return false;
+    }
+  }
+  return true;
+}
+
+std::string from_latin1(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80) {
+      out += c;
+    } else {
+      out += static_cast<char>(0xC0U | (byte >> 6U));
+      out += static_cast<char>(0x80U | (byte & 0x3FU));
+    }
+  }
+  return out;
+}
+
+/// \throws InputError  a CR alone in a file with LF
+std::vector<Line> lines_of(const std::string& path, std::string_view text) {
   std::vector<Line> lines;
+  const char line_end = text.find('\n') == std::string_view::npos ? '\r' : '\n';
   for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = text.find('\n');
+    const std::size_t end = text.find(line_end);
     std::string_view line = text.substr(0, end);
     text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
-    if (line.ends_with('\r')) line.remove_suffix(1);
+    while (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.find('\r') != std::string_view::npos) {
+      throw InputError(path, number, "", "lines that all end with LF, CR LF or CR",
+                       "a CR alone within the line");
+    }
     // A tab at either end of a line may be an empty field.
     if (trimmed(line).empty()) continue;
     if (const auto comment = without_comment_mark(trimmed(line))) {
@@ -151,6 +184,17 @@ Headerless as_rows(const std::vector<Line>& lines, Dialect dialect) {
   return out;
 }
 
+/// Whether the comma of a number may stand between thousands: 1,234 but not 0,123 nor 1234,567 nor 1,23.
+bool may_part_thousands(std::string_view number) {
+  if (number.starts_with('-') || number.starts_with('+')) number.remove_prefix(1);
+  const auto comma = number.find(',');
+  const auto digits = [](std::string_view text) {
+    return std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  return comma != std::string_view::npos && comma >= 1 && comma <= 3 && number.front() != '0' &&
+         digits(number.substr(0, comma)) && number.size() == comma + 4 && digits(number.substr(comma + 1));
+}
+
 bool same_cells(const Headerless& a, const Headerless& b) {
   if (a.rows.front().cells.size() != b.rows.front().cells.size()) return false;
   for (std::size_t k = 0; k < a.rows.size(); ++k) {
@@ -181,14 +225,17 @@ std::optional<double> parse_number(std::string_view text, char decimal, const Un
   return parse_si(number, unit);
 }
 
-void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns,
-                                   const std::optional<char>& given) {
+void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given,
+                                   const std::vector<std::size_t>& small, const char* how) {
   if (given) {
     dialect.decimal = *given;
     return;
   }
   char seen = 0;
   std::size_t first_line = 0;
+  std::size_t first_column = 0;
+  std::string first_cell;
+  bool sure = false;
   for (const TextRow& row : rows) {
     for (const std::size_t c : columns) {
       const std::string& cell = row.cells[c];
@@ -203,9 +250,23 @@ void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns,
                              : fmt::format("a decimal '{}' as in line {}", seen, first_line),
                          "'" + cell + "'");
       }
-      if (seen == 0) first_line = row.line;
+      if (seen == 0) {
+        first_line = row.line;
+        first_column = c;
+        first_cell = cell;
+      }
       seen = mark;
+      sure = sure || mark == '.' || !may_part_thousands(cell) ||
+             std::find(small.begin(), small.end(), c) != small.end();
     }
+  }
+  if (seen != 0 && !sure) {
+    throw InputError(
+        path, first_line, column_label(first_column),
+        fmt::format("a number whose comma is a decimal comma for sure, or {} (comma); commas that part "
+                    "thousands are not read",
+                    how),
+        "'" + first_cell + "'");
   }
   if (seen != 0) dialect.decimal = seen;
 }
@@ -233,7 +294,9 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
     throw InputError(path, 0, "", "text in UTF-8 or Latin-1 (export it so, or: iconv -f UTF-16 -t UTF-8)",
                      "UTF-16 or no text");
   }
-  const std::vector<Line> lines = lines_of(text);
+  const std::string decoded = is_utf8(text) ? std::string() : from_latin1(text);
+  if (!decoded.empty()) text = decoded;
+  const std::vector<Line> lines = lines_of(path, text);
   if (lines.empty()) throw InputError(path, 0, "", "a table of measured points or joints", "nothing in it");
   std::vector<char> tried(delimiters.begin(), delimiters.end());
   if (choice.delimiter) tried = {*choice.delimiter};

@@ -41,8 +41,11 @@ class DelimitedText {
   std::optional<TextRow> header;          ///< absent where the table has none
   std::vector<TextRow> rows;              ///< each with as many cells as the header, or as the first row
 
-  /// Settles the decimal mark by what the cells of these columns hold. \throws InputError  two marks, or both in one cell
-  void settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given);
+  /// Settles the decimal mark by what the cells of these columns hold. Those of `small` never hold a thousand. `how` is
+  /// how people say which mark it is ("--decimal").
+  /// \throws InputError  two marks, or both in one cell; commas that could all part thousands (1,234)
+  void settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given,
+                      const std::vector<std::size_t>& small, const char* how);
 
   /// A cell in SI. `name` is the column's, for messages. \throws InputError  empty or no finite number in this dialect
   double number(const TextRow& row, std::size_t column, const Unit& unit) const;
@@ -56,7 +59,8 @@ using IsHeader = std::function<bool(const std::vector<std::string>& cells)>;
 /// comments (# // ! % at the beginning). Where there is none, all lines but remarks ("Key: value", "units …") are rows, and
 /// the last three cells of each are numbers. Empty lines are skipped.
 /// `header` says what header is expected where there must be one.
-/// \throws InputError  absent, empty, not 8-bit text; a row with another number of cells (file:line); no table; without
+/// Text is UTF-8, or else Latin-1; lines end with LF, CR LF or CR. The cells are UTF-8.
+/// \throws InputError  absent, empty, not 8-bit text; line ends of two kinds, of which one is CR alone; a row with another number of cells (file:line); no table; without
 ///                     header two ways to part the fields that differ
 DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
                              const std::string& header = "");

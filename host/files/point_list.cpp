@@ -96,10 +96,13 @@ class Reader {
     find_columns();
     find_units();
     std::vector<std::size_t> numbers;
+    std::vector<std::size_t> small;  // angles and quaternions
     for (const auto& [role, column] : columns_) {
       if (!is_name(role) && role != "time" && role != "date") numbers.push_back(column);
+      if (role.starts_with('q') || role.starts_with('r') || role == "a" || role == "b" || role == "c")
+        small.push_back(column);
     }
-    table_.settle_decimal(numbers, options.dialect.decimal);
+    table_.settle_decimal(numbers, options.dialect.decimal, small, "--decimal");
   }
 
   PointList read() {
@@ -148,6 +151,14 @@ class Reader {
     require_all({"a", "b", "c"}, true);
     require_all({"qw", "qx", "qy", "qz"}, true);
     require_all({"sx", "sy", "sz"}, true);
+    // The same twice, as parts and as their sum: the parts are what an instrument knows.
+    if (has("sigma") && has("sx")) {
+      if (!options_.columns.empty()) {
+        throw InputError(table_.path, header_line(), "--columns", "sigma or sx, sy, sz", "both");
+      }
+      unused_.push_back(table_.column_label(columns_.at("sigma")));
+      columns_.erase("sigma");
+    }
     if (int(has("rx")) + int(has("a")) + int(has("qw")) > 1) {
       throw InputError(table_.path, header_line(), "", "one orientation", "several (--columns chooses)");
     }
@@ -166,19 +177,28 @@ class Reader {
 
   /// Without a header: x y z at the end, and before them up to three parts of a name.
   void by_position(std::size_t count) {
-    const auto& first = table_.rows.front().cells;
-    const auto is_number = [this](const std::string& cell) {
-      return parse_number(cell, table_.dialect.decimal, unit::si).has_value();
-    };
+    // A name may be a whole number, as long as no other part of the name is a word: "P1 100.5 200.5 300.5 0.015" has a
+    // fourth number that is none.
     bool plain = count <= 6;
-    if (count > 4) {
-      for (const TextRow& row : table_.rows) plain = plain && !is_number(row.cells[0]);
+    const TextRow* shown = &table_.rows.front();
+    for (const TextRow& row : table_.rows) {
+      bool numbers = false;
+      bool fine = true;
+      for (std::size_t k = 0; k + 3 < count; ++k) {
+        const std::string& cell = row.cells[k];
+        if (!parse_number(cell, '.', unit::si) && !parse_number(cell, ',', unit::si)) continue;
+        numbers = true;
+        fine = fine && cell.find_first_of(".,eE") == std::string::npos;
+      }
+      if (fine && (count <= 4 || !numbers)) continue;
+      if (plain) shown = &row;
+      plain = false;
     }
     if (!plain) {
       throw InputError(
-          table_.path, table_.rows.front().line, "",
-          "name X Y Z, or what the fields mean by a header or --columns (such as name,x,y,z,-,-)",
-          fmt::format("{} fields: {}", count, fmt::join(first, " | ")));
+          table_.path, shown->line, "",
+          "name X Y Z, or what the fields mean by a header or --columns (such as name,x,y,z,sigma,-)",
+          fmt::format("{} fields: {}", count, fmt::join(shown->cells, " | ")));
     }
     take("x", count - 3);
     take("y", count - 2);
@@ -198,44 +218,34 @@ class Reader {
                      fmt::format("a column for each of {}", fmt::join(roles, ", ")), "none");
   }
 
-  /// The unit of a kind of columns: what the header, the lines before it and the option say must agree.
-  template <class UnitOf>
-  Unit settle(const std::vector<std::string>& roles, const std::optional<Unit>& remark,
-              const std::optional<Unit>& option, const UnitOf& unit_of, const char* option_name,
-              const char* kind) const {
-    std::optional<Unit> found = remark;
-    std::string by = "the lines before the table";
-    if (table_.header) {
-      std::optional<Unit> header;
-      for (const std::string& role : roles) {
-        const std::string& cell = table_.header->cells[columns_.at(role)];
-        const std::string word = column_name(cell).unit;
-        if (word.empty()) continue;
-        const std::optional<Unit> unit = unit_of(word);
-        if (!unit)
-          throw InputError(table_.path, table_.header->line, cell, fmt::format("a unit of {}", kind), word);
-        if (header && header->name != unit->name) {
-          throw InputError(table_.path, table_.header->line, cell,
-                           fmt::format("{} as beside it", header->name), std::string(unit->name));
-        }
-        header = unit;
-      }
-      if (header) {
-        found = header;
-        by = "the header";
-      }
-    }
-    if (found && option && found->name != option->name) {
-      throw InputError(table_.path, header_line(), option_name,
-                       fmt::format("{}, as {} says", found->name, by), std::string(option->name));
-    }
-    if (!found) found = option;
-    if (found) return *found;
+  /// The unit of a kind of columns, on which the header, the lines before it and the option must agree.
+  Unit settle(const std::vector<std::string>& roles, const UnitSource& remark,
+              const std::optional<Unit>& option, UnitOf unit_of, const char* option_name, const char* kind,
+              const std::vector<std::string>& known) const {
+    if (const auto unit = agreed(roles, {remark}, {option, option_name}, unit_of, kind, known)) return *unit;
     throw InputError(
         table_.path, header_line(), fmt::format("{}", fmt::join(roles, ", ")),
         fmt::format("a unit of {}: in the header (X [mm]), in a line above it (Units: mm) or by {}", kind,
                     option_name),
         fmt::format("none; the first row has {}", first_values(roles)));
+  }
+
+  /// The same, but nothing where nobody says one.
+  std::optional<Unit> agreed(const std::vector<std::string>& roles, std::vector<UnitSource> sources,
+                             const UnitSource& option, UnitOf unit_of, const char* kind,
+                             const std::vector<std::string>& known) const {
+    std::string field = fmt::format("{}", fmt::join(roles, ", "));
+    if (table_.header) {
+      for (const std::string& role : roles) {
+        const std::string& label = table_.header->cells[columns_.at(role)];
+        sources.push_back({unit_in_name(table_.path, header_line(), label, unit_of,
+                                        fmt::format("a unit of {} ({})", kind, fmt::join(known, ", "))),
+                           fmt::format("the name '{}'", label)});
+        if (sources.back().unit) agreed_unit(table_.path, header_line(), field = label, sources);
+      }
+    }
+    sources.push_back(option);
+    return agreed_unit(table_.path, header_line(), field, sources);
   }
 
   std::string first_values(const std::vector<std::string>& roles) const {
@@ -245,15 +255,15 @@ class Reader {
   }
 
   void find_units() {
-    const DeclaredUnits declared = declared_units(table_.remarks);
-    if (declared.contradicts) {
-      throw InputError(table_.path, table_.remark_lines[*declared.contradicts], "",
-                       "the same units as in a line before", table_.remarks[*declared.contradicts]);
-    }
-    length_ = settle({"x", "y", "z"}, declared.length, options_.length, length_unit_of, "--unit", "length");
+    const DeclaredUnits declared = declared_units(table_);
+    length_ = settle({"x", "y", "z"}, declared.length, options_.length, length_unit_of, "--unit", "length",
+                     length_unit_names());
+    const auto angle_of = [&](const std::vector<std::string>& roles) {
+      return settle(roles, declared.angle, options_.angle, angle_unit_of, "--angle-unit", "angle",
+                    angle_unit_names());
+    };
     if (has("rx")) {
-      angle_ =
-          settle({"rx", "ry", "rz"}, declared.angle, options_.angle, angle_unit_of, "--angle-unit", "angle");
+      angle_ = angle_of({"rx", "ry", "rz"});
       if (!options_.angles) {
         throw InputError(
             table_.path, header_line(), "rx, ry, rz",
@@ -262,19 +272,35 @@ class Reader {
             "nothing");
       }
     }
-    if (has("a"))
-      angle_ =
-          settle({"a", "b", "c"}, declared.angle, options_.angle, angle_unit_of, "--angle-unit", "angle");
+    if (has("a")) angle_ = angle_of({"a", "b", "c"});
     // Uncertainties may have a unit of their own (µm); without one they have that of the points.
     for (const std::vector<std::string>& roles : {std::vector<std::string>{"sigma"}, {"sx", "sy", "sz"}}) {
       if (has(roles[0]))
-        sigma_ =
-            settle(roles, std::optional<Unit>(length_), std::nullopt, length_unit_of, "--unit", "length");
+        sigma_ = agreed(roles, {}, {}, length_unit_of, "length", length_unit_names()).value_or(length_);
     }
-    if (has("time") && table_.header) {
-      const std::string word = column_name(table_.header->cells[columns_.at("time")]).unit;
-      if (const auto unit = time_unit_of(word)) time_ = *unit;
-    }
+    if (has("time")) find_time_unit(declared.time);
+    refuse_idle_options();
+  }
+
+  /// Of times that are numbers: "Time [UTC]" with times of day needs none.
+  void find_time_unit(const UnitSource& declared) {
+    const std::size_t column = columns_.at("time");
+    const auto is_number = [this, column](const TextRow& row) {
+      return parse_number(row.cells[column], '.', unit::si) || parse_number(row.cells[column], ',', unit::si);
+    };
+    if (has("date") || std::none_of(table_.rows.begin(), table_.rows.end(), is_number)) return;
+    time_ = agreed({"time"}, {declared}, {}, time_unit_of, "time", time_unit_names()).value_or(unit::si);
+  }
+
+  /// An option for columns that are not there was meant for another file.
+  void refuse_idle_options() const {
+    const auto idle = [this](bool given, bool used, const char* option, const char* columns) {
+      if (given && !used) throw InputError(table_.path, header_line(), option, columns, "none");
+    };
+    idle(options_.angles.has_value(), has("rx"), "--angles", "columns rx, ry, rz");
+    idle(options_.angle.has_value(), has("rx") || has("a"), "--angle-unit", "columns rx, ry, rz or a, b, c");
+    idle(options_.coverage != 1, has("sigma") || has("sx"), "--coverage",
+         "a column sigma or columns ux, uy, uz");
   }
 
   double number(const TextRow& row, const std::string& role, const Unit& unit) const {
@@ -311,11 +337,11 @@ class Reader {
     if (list.sigmas) {
       const Eigen::Vector3d s = has("sx") ? three(row, "sx", "sy", "sz", sigma_)
                                           : Eigen::Vector3d::Constant(number(row, "sigma", sigma_));
-      if (!(s.minCoeff() > 0)) {
-        throw InputError(table_.path, row.line, has("sx") ? "sx, sy, sz" : "sigma", "an uncertainty above 0",
-                         fmt::format("{:g} m", s.minCoeff()));
+      p.sigma_m = tidied(s.stableNorm() / std::sqrt(3.0) / options_.coverage, unit::mm);
+      if (!(s.minCoeff() > 0 && p.sigma_m > 0 && std::isfinite(p.sigma_m))) {
+        throw InputError(table_.path, row.line, has("sx") ? "sx, sy, sz" : "sigma",
+                         "an uncertainty above 0 (and above 1e-10 mm)", fmt::format("{:g} m", s.minCoeff()));
       }
-      p.sigma_m = s.norm() / std::sqrt(3.0) / options_.coverage;
     }
     if (list.times) {
       const std::size_t column = columns_.at("time");

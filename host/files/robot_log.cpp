@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "files/data_file.hpp"
@@ -28,17 +29,44 @@ bool is_joint_stem(const std::string& stem, std::size_t joint) {
   return false;
 }
 
-std::optional<std::size_t> find_joint(const std::vector<std::string>& cells, std::size_t joint) {
+/// The columns that could be this joint. What has a unit of voltage, speed and the like is none, unless there is nothing else.
+std::vector<std::size_t> find_joint(const std::vector<std::string>& cells, std::size_t joint) {
+  std::vector<std::size_t> angles;
+  std::vector<std::size_t> others;
   for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (is_joint_stem(column_name(cells[k]).stem, joint)) return k;
+    const ColumnName name = column_name(cells[k]);
+    if (is_joint_stem(name.stem, joint)) (is_no_angle(name.unit) ? others : angles).push_back(k);
   }
-  return {};
+  return angles.empty() ? others : angles;
 }
 
 std::optional<std::size_t> find_cell(const std::vector<std::string>& cells, const std::string& name) {
   const auto at = std::find(cells.begin(), cells.end(), name);
   if (at == cells.end()) return {};
   return static_cast<std::size_t>(at - cells.begin());
+}
+
+/// \throws InputError  a column of this name stands there again
+void require_once(const DelimitedText& table, const std::string& column) {
+  if (std::count(table.header->cells.begin(), table.header->cells.end(), column) > 1) {
+    throw InputError(table.path, table.header->line, column, "a column of this name once",
+                     "two with the same name");
+  }
+}
+
+/// The column that is `what`; nothing where there is none.
+/// \throws InputError  several could be it: `choose` says how to tell
+std::optional<std::size_t> only_one(const DelimitedText& table, const std::vector<std::size_t>& columns,
+                                    const std::string& what, const char* choose) {
+  if (columns.empty()) return {};
+  const std::string& label = table.header->cells[columns.front()];
+  require_once(table, label);
+  if (columns.size() > 1) {
+    throw InputError(table.path, table.header->line, label,
+                     fmt::format("one column that can be {} ({} says which)", what, choose),
+                     fmt::format("'{}' as well", table.header->cells[columns[1]]));
+  }
+  return columns.front();
 }
 
 bool one_of(const std::vector<std::string>& names, const std::string& name) {
@@ -48,6 +76,7 @@ bool one_of(const std::vector<std::string>& names, const std::string& name) {
 /// \throws InputError naming the map
 std::size_t require(const DelimitedText& table, const LogMap& map, const std::string& column,
                     const std::string& what) {
+  require_once(table, column);
   if (const auto at = find_cell(table.header->cells, column)) return *at;
   const std::string near = nearest(column, table.header->cells);
   throw InputError(table.path, table.header->line, column,
@@ -67,6 +96,47 @@ std::optional<char> character(const YamlField& map, const std::string& key, cons
     throw field->error(key == "decimal" ? "\".\" or \",\"" : "\",\", \";\", tab or blanks");
   }
   return text[0];
+}
+
+/// \throws InputError  a column of the log in another unit than the data file's column that it shall become
+void require_unit_of(const DelimitedText& table, const std::string& key, const std::string& column) {
+  const std::string found = column_name(column).unit;
+  if (found.empty()) return;
+  const std::string wanted = column_name(key).unit;
+  const auto same = [&](UnitOf unit_of) {
+    const auto a = unit_of(found);
+    const auto b = unit_of(wanted);
+    return a && b && a->name == b->name;
+  };
+  std::string lower = found;
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool celsius = key == "temp_c" && one_of({"c", "°c", "degc", "deg c", "celsius"}, lower);
+  if (celsius || lower == wanted || (!wanted.empty() && (same(length_unit_of) || same(angle_unit_of))))
+    return;
+  throw InputError(
+      table.path, table.header->line, column,
+      key == "temp_c" ? std::string("degrees Celsius, as temp_c") : fmt::format("the unit of {}", key),
+      fmt::format("'{}'", found));
+}
+
+bool mapped(const LogMap& map, const std::string& key) {
+  return std::any_of(map.context.begin(), map.context.end(), [&](const auto& c) { return c.first == key; });
+}
+
+/// Seconds where nobody says otherwise. Only numbers have a unit: "Time [UTC]" with times of day needs none.
+Unit unit_of_times(const DelimitedText& table, const LogMap& map, std::size_t column,
+                   const UnitSource& declared) {
+  const auto is_number = [column](const TextRow& row) {
+    return parse_number(row.cells[column], '.', unit::si) || parse_number(row.cells[column], ',', unit::si);
+  };
+  if (std::none_of(table.rows.begin(), table.rows.end(), is_number)) return unit::si;
+  const std::string& label = table.header->cells[column];
+  const auto in_name = unit_in_name(table.path, table.header->line, label, time_unit_of,
+                                    fmt::format("a unit of time ({})", fmt::join(time_unit_names(), ", ")));
+  return agreed_unit(table.path, table.header->line, label,
+                     {declared, {map.time_unit, map.path}, {in_name, "the column's name"}})
+      .value_or(unit::si);
 }
 
 }  // namespace
@@ -130,10 +200,9 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotF
                                           "…), or --joint-columns or --map";
   const auto is_header = [&map](const std::vector<std::string>& cells) {
     for (std::size_t j = 0; j < joint_count; ++j) {
-      const auto at = map.joints ? find_cell(cells, (*map.joints)[j].column) : find_joint(cells, j);
       // Of the columns that a map names one is enough: the header is found, and what is missing is said by name.
-      if (map.joints && at) return true;
-      if (!map.joints && !at) return false;
+      if (map.joints && find_cell(cells, (*map.joints)[j].column)) return true;
+      if (!map.joints && find_joint(cells, j).empty()) return false;
     }
     return !map.joints;
   };
@@ -143,30 +212,25 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotF
   std::vector<bool> used(table.header->cells.size());
   std::array<std::size_t, joint_count> joints{};
   std::array<JointColumn, joint_count> how;
-  const DeclaredUnits declared = declared_units(table.remarks);
+  const DeclaredUnits declared = declared_units(table);
   for (std::size_t j = 0; j < joint_count; ++j) {
     if (map.joints) how[j] = (*map.joints)[j];
     joints[j] = map.joints ? require(table, map, how[j].column, fmt::format("joint {}", j + 1))
-                           : *find_joint(table.header->cells, j);
+                           : *only_one(table, find_joint(table.header->cells, j),
+                                       fmt::format("joint {}", j + 1), "--map or --joint-columns");
     if (used[joints[j]]) {
       throw InputError(path, table.header->line, table.column_label(joints[j]), "a column for each joint",
                        fmt::format("it again for joint {}", j + 1));
     }
     used[joints[j]] = true;
     const std::string& label = table.header->cells[joints[j]];
-    const auto in_name = angle_unit_of(column_name(label).unit);
-    if (how[j].unit && in_name && how[j].unit->name != in_name->name) {
-      throw InputError(path, table.header->line, label,
-                       fmt::format("{}, as {} says", how[j].unit->name, map.path),
-                       std::string(in_name->name));
-    }
-    if (map.joint_unit && in_name && map.joint_unit->name != in_name->name) {
-      throw InputError(path, table.header->line, "--joint-unit",
-                       fmt::format("{}, as the column's name says", in_name->name),
-                       std::string(map.joint_unit->name));
-    }
-    if (!how[j].unit) how[j].unit = in_name;
-    if (!how[j].unit) how[j].unit = map.joint_unit ? map.joint_unit : declared.angle;
+    const auto in_name =
+        unit_in_name(path, table.header->line, label, angle_unit_of, "a joint's unit, deg or rad");
+    how[j].unit = agreed_unit(path, table.header->line, label,
+                              {{how[j].unit, map.path},
+                               declared.angle,
+                               {in_name, "the column's name"},
+                               {map.joint_unit, "--joint-unit"}});
     if (!how[j].unit) {
       throw InputError(
           path, table.header->line, label,
@@ -175,38 +239,53 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotF
     }
     log.joint_columns[j] = label;
   }
-  std::optional<std::size_t> name;
-  std::optional<std::size_t> time;
-  Unit time_unit = map.time_unit.value_or(unit::si);
-  if (!map.name.empty()) name = require(table, map, map.name, "name");
-  if (!map.time.empty()) time = require(table, map, map.time, "time");
+  std::vector<std::size_t> names;
+  std::vector<std::size_t> times;
+  if (!map.name.empty()) names = {require(table, map, map.name, "name")};
+  if (!map.time.empty()) times = {require(table, map, map.time, "time")};
   std::vector<std::size_t> context;
   for (const auto& [key, column] : map.context) {
     context.push_back(require(table, map, column, key));
+    require_unit_of(table, key, column);
     log.context.push_back(key);
     used[context.back()] = true;
   }
   for (std::size_t k = 0; k < used.size(); ++k) {
-    if (used[k] || k == name || k == time) continue;
     const std::string& label = table.header->cells[k];
     const ColumnName parts = column_name(label);
-    if (!name && one_of(name_stems, parts.stem)) {
-      name = k;
-    } else if (!time && one_of(time_stems, parts.stem)) {
-      time = k;
-    } else if (one_of(context_names(), label) && !one_of(log.context, label)) {
+    const auto is = [k](const std::vector<std::size_t>& columns) {
+      return std::find(columns.begin(), columns.end(), k) != columns.end();
+    };
+    if (used[k] || is(names) || is(times)) continue;
+    if (map.name.empty() && one_of(name_stems, parts.stem)) {
+      names.push_back(k);
+    } else if (map.time.empty() && one_of(time_stems, parts.stem)) {
+      times.push_back(k);
+    } else if (one_of(context_names(), label) && !mapped(map, label)) {
+      require_once(table, label);
       context.push_back(k);
       log.context.push_back(label);
     } else {
       log.unused.push_back(label);
     }
   }
-  if (time && !map.time_unit) {
-    if (const auto unit = time_unit_of(column_name(table.header->cells[*time]).unit)) time_unit = *unit;
+  const auto time = only_one(table, times, "the time", "--map");
+  const Unit time_unit = time ? unit_of_times(table, map, *time, declared.time) : unit::si;
+  // Two columns with names do no harm to who joins by order or time.
+  std::optional<std::size_t> name;
+  if (names.size() > 1) {
+    for (const std::size_t k : names) {
+      log.doubtful_names.push_back(table.header->cells[k]);
+      log.unused.push_back(table.header->cells[k]);
+    }
+  } else if (!names.empty()) {
+    name = names.front();
   }
+  log.header_line = table.header->line;
   std::vector<std::size_t> numbers(joints.begin(), joints.end());
   numbers.insert(numbers.end(), context.begin(), context.end());
-  table.settle_decimal(numbers, map.dialect.decimal);
+  // No joint turns a thousand degrees or radians: a comma there is a decimal comma.
+  table.settle_decimal(numbers, map.dialect.decimal, {joints.begin(), joints.end()}, "decimal in --map");
   log.dialect = table.dialect;
   log.names = name.has_value();
   log.times = time.has_value();

@@ -51,7 +51,9 @@ struct LogRow {
 struct RobotLog {
   std::string path;
   Dialect dialect;
+  std::size_t header_line = 0;
   bool names = false;
+  std::vector<std::string> doubtful_names;  ///< columns of which each could be the name: then none is read
   bool times = false;
   std::array<std::string, joint_count> joint_columns;
   std::vector<std::string>
@@ -62,8 +64,9 @@ struct RobotLog {
 
 /// Without map the joints are the columns q1 … q6, j1 … j6, a1 … a6, joint1 … or axis1 … with a unit in their names or by
 /// `map.joint_unit`; columns that are called as in a data file (payload_kg, temp_c …) are taken as they are.
-/// \throws InputError  as read_delimited(); a column that is not there, or a joint without unit; a cell that is no number;
-///                     a reading beyond the limits of `robot`
+/// \throws InputError  as read_delimited(); a column that is not there, there twice, or one of two that could be meant; a
+///                     joint without unit, a unit that is not known or contradicts another; a cell that is no number; a
+///                     reading beyond the limits of `robot`
 RobotLog read_robot_log(const std::string& path, const LogMap& map, const RobotFile& robot);
 
 }  // namespace flexcomp::host

@@ -69,18 +69,19 @@ std::optional<TimeStamp> time_stamp(std::string_view text, const Unit& unit, cha
     const auto time = of_day(rest);
     if (!time) return {};
     double offset = 0;
+    const Clock clock = rest.empty() ? Clock::date : Clock::zoned;
     if (!rest.empty() && !take(rest, "Z")) {
       const double sign = rest.front() == '-' ? -1 : 1;
       if (!take(rest, "+-")) return {};
       const auto h = digits(rest, 2);
       take(rest, ":");
       const auto m = rest.empty() ? std::optional<int>(0) : digits(rest, 2);
-      if (!h || !m) return {};
+      if (!h || !m || *h > 14 || *m > 59) return {};
       offset = sign * (*h * 3600.0 + *m * 60.0);
     }
     if (!rest.empty()) return {};
     const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    return TimeStamp{static_cast<double>(days) * 86400.0 + *time - offset, Clock::date};
+    return TimeStamp{static_cast<double>(days) * 86400.0 + *time - offset, clock};
   }
   std::string number(text);
   if (decimal == ',') {
@@ -97,8 +98,10 @@ const char* words(Clock clock) {
       return "seconds from a start of its own";
     case Clock::day:
       return "times of day";
+    case Clock::date:
+      return "dates with times, without a time zone";
     default:
-      return "dates with times";
+      return "dates with times and a time zone (Z, +01:00)";
   }
 }
 

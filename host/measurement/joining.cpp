@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <optional>
-#include <regex>
+#include <string_view>
 #include <utility>
 
 #include "files/input_error.hpp"
@@ -32,54 +31,93 @@ std::string shown(const LogRow& r) {
   return r.name.empty() ? fmt::format("line {}", r.line) : fmt::format("{} (line {})", r.name, r.line);
 }
 
-/// What a name says by a pattern.
+/// What a name says by a pattern. Of several ways to match, each wildcard takes as much as it can, from the left. In time
+/// and memory of the name's length: names come out of files.
 class NamePattern {
  public:
   explicit NamePattern(const std::string& pattern) {
-    std::string text;
+    const auto refuse = [&pattern](const std::string& expected) {
+      throw InputError("", 0, "--names", expected, "'" + pattern + "'");
+    };
     for (std::size_t k = 0; k < pattern.size();) {
-      const auto take = [&](const std::string& word, int& group, const char* as) {
+      const auto take = [&](std::string_view word, Kind kind) {
         if (pattern.compare(k, word.size(), word) != 0) return false;
-        if (group != 0) throw InputError("", 0, "--names", fmt::format("{} once", word), "'" + pattern + "'");
-        group = ++groups_;
-        text += as;
+        if (kind != Kind::anything && has(kind)) refuse(fmt::format("{} once", word));
+        // Two stars are one.
+        if (parts_.empty() || parts_.back().kind != kind) parts_.push_back({kind, {}});
         k += word.size();
         return true;
       };
-      if (take("{pose}", pose_, "(.+)") || take("{reflector}", reflector_, "([a-dA-D1-4])")) continue;
-      if (pattern[k] == '*') {
-        text += ".*";
-      } else {
-        if (std::isalnum(static_cast<unsigned char>(pattern[k])) == 0) text += '\\';
-        text += pattern[k];
-      }
-      ++k;
+      if (take("{pose}", Kind::pose) || take("{reflector}", Kind::reflector) || take("*", Kind::anything))
+        continue;
+      if (parts_.empty() || parts_.back().kind != Kind::text) parts_.push_back({Kind::text, {}});
+      parts_.back().text += pattern[k++];
     }
-    if (pose_ == 0)
-      throw InputError("", 0, "--names", "{pose} where the name of the pose stands", "'" + pattern + "'");
-    expression_ = std::regex(text);
+    if (!has(Kind::pose)) refuse("{pose} where the name of the pose stands");
+    for (std::size_t k = 1; k < parts_.size(); ++k) {
+      const auto beside = [&](Kind a, Kind b) { return parts_[k - 1].kind == a && parts_[k].kind == b; };
+      if (beside(Kind::anything, Kind::pose) || beside(Kind::pose, Kind::anything))
+        refuse("something between * and {pose}, or nobody knows where the pose's name begins and ends");
+    }
   }
 
-  bool has_reflectors() const { return reflector_ != 0; }
+  bool has_reflectors() const { return has(Kind::reflector); }
 
   /// Pose and reflector (0 … 3), or nothing where the name is another one.
   std::optional<std::pair<std::string, std::size_t>> read(const std::string& name) const {
-    std::smatch match;
-    if (!std::regex_match(name, match, expression_)) return {};
-    std::size_t reflector = 0;
-    if (reflector_ != 0) {
-      const char c = static_cast<char>(
-          std::tolower(static_cast<unsigned char>(match.str(static_cast<std::size_t>(reflector_))[0])));
-      reflector = static_cast<std::size_t>(c >= 'a' ? c - 'a' : c - '1');
+    // matches[p][k]: whether the parts from p on match the name from k on.
+    std::vector<std::vector<bool>> matches(parts_.size() + 1, std::vector<bool>(name.size() + 1));
+    matches.back()[name.size()] = true;
+    for (std::size_t p = parts_.size(); p-- > 0;) {
+      const Part& part = parts_[p];
+      const std::vector<bool>& after = matches[p + 1];
+      for (std::size_t k = name.size() + 1; k-- > 0;) {
+        const bool more = k < name.size();
+        if (part.kind == Kind::text) {
+          matches[p][k] = k + part.text.size() <= name.size() && after[k + part.text.size()] &&
+                          name.compare(k, part.text.size(), part.text) == 0;
+        } else if (part.kind == Kind::reflector) {
+          matches[p][k] = more && reflector_of(name[k]) && after[k + 1];
+        } else if (part.kind == Kind::pose) {
+          matches[p][k] = more && (after[k + 1] || matches[p][k + 1]);
+        } else {
+          matches[p][k] = after[k] || (more && matches[p][k + 1]);
+        }
+      }
     }
-    return std::pair(match.str(static_cast<std::size_t>(pose_)), reflector);
+    if (!matches.front()[0]) return {};
+    std::pair<std::string, std::size_t> out;
+    std::size_t from = 0;
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      const Part& part = parts_[p];
+      std::size_t to = name.size();
+      if (part.kind == Kind::text) to = from + part.text.size();
+      if (part.kind == Kind::reflector) to = from + 1;
+      while (!matches[p + 1][to]) --to;
+      if (part.kind == Kind::pose) out.first = name.substr(from, to - from);
+      if (part.kind == Kind::reflector) out.second = *reflector_of(name[from]);
+      from = to;
+    }
+    return out;
   }
 
  private:
-  int groups_ = 0;
-  int pose_ = 0;
-  int reflector_ = 0;
-  std::regex expression_;
+  enum class Kind { text, anything, pose, reflector };
+  struct Part {
+    Kind kind;
+    std::string text;
+  };
+
+  bool has(Kind kind) const {
+    return std::any_of(parts_.begin(), parts_.end(), [kind](const Part& p) { return p.kind == kind; });
+  }
+
+  static std::optional<std::size_t> reflector_of(char c) {
+    const auto at = std::string_view("abcdABCD1234").find(c);
+    return at == std::string_view::npos ? std::optional<std::size_t>() : at % 4;
+  }
+
+  std::vector<Part> parts_;
 };
 
 std::string last_part(const std::string& name) {
@@ -135,9 +173,26 @@ std::vector<Group> groups_by_name(const PointList& list, const RobotLog& log, co
     if (place != nullptr) once(p, *place, "");
     place = &p;
   }
-  const auto with_d =
-      std::find_if(order.begin(), order.end(), [&](const auto& k) { return poses[k][3] != nullptr; });
-  const std::size_t count = with_d == order.end() ? 3 : 4;
+  std::size_t with_d = 0;
+  std::size_t without_d = 0;  // but with the other three
+  const ListedPoint* first_d = nullptr;
+  for (const std::string& key : order) {
+    const auto& four = poses[key];
+    if (four[3] != nullptr) {
+      ++with_d;
+      if (first_d == nullptr) first_d = four[3];
+    } else if (four[0] != nullptr && four[1] != nullptr && four[2] != nullptr) {
+      ++without_d;
+    }
+  }
+  // Among poses of four one may lack a reflector, but a fourth one here and there is no reason to leave all others out.
+  if (first_d != nullptr && without_d >= with_d) {
+    throw InputError(
+        list.path, first_d->line, first_d->name,
+        fmt::format("three reflectors a, b, c at every pose, as {} poses have them, or four", without_d),
+        fmt::format("a fourth one at {}", with_d == 1 ? "this pose alone" : fmt::format("{} poses", with_d)));
+  }
+  const std::size_t count = with_d == 0 ? 3 : 4;
   for (const std::string& key : order) {
     const auto& four = poses[key];
     Group group{key, key, {}};
@@ -151,9 +206,10 @@ std::vector<Group> groups_by_name(const PointList& list, const RobotLog& log, co
       out.push_back(std::move(group));
       continue;
     }
-    const auto any =
-        std::find_if(four.begin(), four.end(), [](const ListedPoint* p) { return p != nullptr; });
-    lonely.push_back(fmt::format("{} (line {}), without reflector {}", key, (*any)->line, missing));
+    for (const ListedPoint* p : four) {
+      if (p != nullptr)
+        lonely.push_back(fmt::format("{}, of pose {} without reflector {}", shown(*p), key, missing));
+    }
   }
   return out;
 }
@@ -180,6 +236,7 @@ class Joiner {
   }
 
   Joining run() {
+    if (log_.times) require_one_clock(log_.path, log_.rows, log_.rows.front().time.clock);
     switch (options_.by) {
       case JoinBy::name:
         by_name();
@@ -208,6 +265,11 @@ class Joiner {
   void by_name() {
     if (!list_.names)
       throw InputError(list_.path, 0, "--join name", "a column with names", "none (--join order or time)");
+    if (!log_.doubtful_names.empty()) {
+      throw InputError(log_.path, log_.header_line, log_.doubtful_names[0],
+                       "one column that can be the pose's name (name: in --map says which)",
+                       fmt::format("'{}' as well", log_.doubtful_names[1]));
+    }
     if (!log_.names)
       throw InputError(log_.path, 0, "--join name", "a column with names", "none (--join order or time)");
     std::map<std::string, std::size_t> rows;
@@ -245,9 +307,7 @@ class Joiner {
   void by_time() {
     if (!list_.times) throw InputError(list_.path, 0, "--join time", "a column with times", "none");
     if (!log_.times) throw InputError(log_.path, 0, "--join time", "a column with times", "none");
-    const Clock clock = log_.rows.front().time.clock;
-    for (const LogRow& r : log_.rows) same_clock(log_.path, r.line, r.time.clock, clock);
-    for (const ListedPoint& p : list_.points) same_clock(list_.path, p.line, p.time.clock, clock);
+    require_one_clock(list_.path, list_.points, log_.rows.front().time.clock);
     std::vector<std::size_t> order(log_.rows.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     const auto at_time = [this](std::size_t k) { return log_.rows[k].time.seconds; };
@@ -283,8 +343,26 @@ class Joiner {
     }
   }
 
-  static void same_clock(const std::string& path, std::size_t line, Clock found, Clock expected) {
-    if (found != expected) throw InputError(path, line, "time", words(expected), words(found));
+  /// Every time is of this clock, and times of day are of one day.
+  template <class Row>
+  static void require_one_clock(const std::string& path, const std::vector<Row>& rows, Clock clock) {
+    const Row* before = nullptr;
+    for (const Row& row : rows) {
+      if (row.time.clock != clock)
+        throw InputError(path, row.line, "time", words(clock), words(row.time.clock));
+      if (clock == Clock::day && before != nullptr && row.time.seconds < before->time.seconds - 3600) {
+        throw InputError(
+            path, row.line, "time",
+            "times of day of one day, each after the one before (past midnight only a date tells)",
+            fmt::format("{} after {} in line {}", of_day(row.time.seconds), of_day(before->time.seconds),
+                        before->line));
+      }
+      before = &row;
+    }
+  }
+  static std::string of_day(double seconds) {
+    const auto s = static_cast<int>(seconds);
+    return fmt::format("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
   }
 
   void add(const Group& group, std::size_t at) {
@@ -307,7 +385,7 @@ class Joiner {
         m.reflector_m[r] = group.points[r]->position_m;
         square += group.points[r]->sigma_m * group.points[r]->sigma_m;
       }
-      m.position_sigma_m = std::sqrt(square / static_cast<double>(group.points.size()));
+      m.position_sigma_m = tidied(std::sqrt(square / static_cast<double>(group.points.size())), unit::mm);
     } else {
       const ListedPoint& p = *group.points.front();
       data.kind = list_.orientations ? MeasurementKind::pose : MeasurementKind::position;
@@ -319,6 +397,7 @@ class Joiner {
     if (list_.names) m.extra.push_back(group.label);
     data.rows.push_back(std::move(m));
     out_.log_lines.push_back(row.line);
+    out_.point_lines.push_back(group.points.front()->line);
   }
 
   const PointList& list_;

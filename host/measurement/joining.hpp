@@ -20,7 +20,7 @@ enum class JoinBy { name, order, time };
 struct JoinOptions {
   JoinBy by = JoinBy::name;
   /// How points are called, with {pose}, {reflector} (a … d or 1 … 4) and * for anything: "*::{pose}_{reflector}". Empty:
-  /// the whole name, or its last part behind :: where the log's names have none.
+  /// the whole name, or its last part behind :: where the log's names have none. Never * beside {pose}.
   std::string names;
   std::size_t reflectors = 0;  ///< 3 or 4 points one after the other belong to a pose (by order); 0: one
   bool repeats = false;        ///< several points of one name are the pose measured again
@@ -32,14 +32,15 @@ struct JoinOptions {
 
 struct Joining {
   DataFile data;  ///< without path; context of the log in `extra`, as is the point's name
-  std::vector<std::size_t> log_lines;  ///< of each row
+  std::vector<std::size_t> log_lines;    ///< of each row
+  std::vector<std::size_t> point_lines;  ///< of each row, of its first point
   std::vector<std::string>
       lonely_points;                     ///< "P7 (line 9)": measured, but nobody knows where the joints were
   std::vector<std::string> lonely_rows;  ///< rows of the log at which nothing was measured; not by time
 };
 
-/// \throws InputError  files without the names or times that it goes by, or with clocks of two kinds; two rows of the log
-///                     with one name; two points of one name (but see `repeats`); by order: other numbers of points than of
+/// \throws InputError  files without the names or times that it goes by, or with clocks of two kinds (a zone or none are two),
+///                     or times of day across midnight; two rows of the log with one name; two points of one name (but see `repeats`); by order: other numbers of points than of
 ///                     rows; by time: a point at which the arm was moving; nothing joined
 Joining join(const PointList& points, const RobotLog& log, const JoinOptions& options);
 

@@ -173,7 +173,10 @@ asked = {"flexcomp|ident": "identify", "flexcomp|pu": "push pull", "flexcomp|ide
          "flexcomp|identify|--model|": "full geometric no-gravity no-stiffness", "flexcomp|identify|--model|no-s": "no-stiffness",
          "flexcomp|identify|--robot|tx": "tx60l.yaml", "flexcomp|identify|--robot|rob": "robots", "flexcomp|identify|--data|zz": "zz file.csv",
          "flexcomp|study|fig": "fig2 fig3 fig4 fig8", "flexcomp|export|--as|": "c urdf eds modbus", "flexcomp|export|--urdf|kr": "kr6.urdf",
-         "flexcomp|push|--dr": "--dry-run", "flexcomp|completion|": "bash", "flexcomp|simulate|--poses|1": "", "flexcomp|nothing|-": ""}
+         "flexcomp|push|--dr": "--dry-run", "flexcomp|import|--delimiter|": "blanks comma semicolon tab", "flexcomp|import|--decimal|": "comma point",
+         "flexcomp|identify|--model|=|no-s": "no-stiffness", "flexcomp|identify|--model|=": "full geometric no-gravity no-stiffness",
+         "flexcomp|identify|--model=no-": "--model=no-gravity --model=no-stiffness", "flexcomp|identify|--robot=tx": "--robot=tx60l.yaml",
+         "flexcomp|identify|--robot|=|tx": "tx60l.yaml", "flexcomp|completion|": "bash", "flexcomp|simulate|--poses|1": "", "flexcomp|nothing|-": ""}
 r = subprocess.run(["bash", "--norc", "ask.sh"], input="\n".join(asked) + "\n", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 got = r.stdout.split("\n")[:-1]
 if r.returncode or len(got) != len(asked): fail("completion", r.returncode, r.stdout, r.stderr)
@@ -185,6 +188,25 @@ for command in commands:
     offered = set(subprocess.run(["bash", "--norc", "ask.sh"], input="flexcomp|%s|--\n" % command, stdout=subprocess.PIPE, text=True).stdout.split())
     missing = {o for o in re.findall(r"^  (?:-\w,)?(--[a-z][-a-z0-9]*)", done(["flexcomp", command, "--help"]), re.M)} - offered
     if missing or not offered: fail("completion of", command, "lacks", missing, offered)
+
+# --- numbers: what takes one takes no nan, no inf and nothing beyond a double, in any command
+def complaint(command, option, value):
+    """What is said against this option: other options may be missing, which is said later."""
+    code, said, warned = run(["flexcomp", command, "%s=%s" % (option, value)])
+    return warned if code == 2 and re.search(r"(^|\s)%s: |= %s(\s|$)|%s = " % (option, re.escape(value), option), warned) else ""
+numbers = set()
+for command in commands:
+    for option in re.findall(r"^  (?:-\w,)?(--[a-z][-a-z0-9]*) (?!Excludes:|Needs:)[A-Z]", done(["flexcomp", command, "--help"]), re.M):
+        for good, wrong in (("1", "abc"), ("1,1,1,1,1,1", "1,1,abc,1,1,1")):
+            if complaint(command, option, good) or not complaint(command, option, wrong): continue
+            numbers.add((command, option))
+            for bad in ("nan", "NaN", "inf", "-inf", "infinity", "1e999", "-1e999", "nan(1)"):
+                if not complaint(command, option, wrong.replace("abc", bad)): fail(command, option, "takes", bad)
+for known in (("import", "--tolerance"), ("import", "--time-shift"), ("import", "--coverage"), ("simulate", "--frame"), ("simulate", "--payloads"),
+              ("compensate", "--start"), ("compensate", "--frame"), ("plan", "--effort"), ("plan", "--payloads"), ("push", "--trial"), ("status", "--timeout")):
+    if known not in numbers: fail(known, "is not among the options that take numbers", numbers)
+print(len(numbers), "options take numbers")
+done(["flexcomp", "simulate", "--robot", "tx60l.yaml", "--truth", "truth.yaml", "--poses", "5", "--frame", "1500, -200, 300, 0, .5, 1e1", "-o", "frame.csv"])
 
 # --- colour: on a terminal alone
 validate = ["flexcomp", "validate", "--robot", "tx60l.yaml", "--calibration", "cal.yaml", "--data", "others.csv"]
@@ -230,6 +252,16 @@ for command, status, says in (
     code, said, warned = run(command)
     if code != status or says not in warned: fail(command, code, warned)
     if not any(l.startswith("hint: ") for l in warned.split("\n")): fail("no hint:", warned)
+# No advice is better than a wrong one: what this very command does, a file that is called quite otherwise.
+shutil.copy("tx60l.yaml", "worn.yaml")
+for command, never in (("flexcomp import tracker.txt --joints log.csv --joint-columns q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6 --robot tx60l.yaml -o x.csv", "flexcomp import"),
+                       ("flexcomp identify --robot nope.yaml --data measured.csv -o x.yaml", "there is"),
+                       ("flexcomp identify --robot tx60l.yaml --data q.txt -o x.yaml", "there is t")):
+    code, said, warned = run(command)
+    if code != 3 or never in warned: fail(command, code, warned)
+for wrong, right in (("tx60.yaml", "tx60l.yaml"), ("tx60l.yml", "tx60l.yaml"), ("wron.yaml", "worn.yaml")):
+    code, said, warned = run("flexcomp identify --robot %s --data measured.csv -o x.yaml" % wrong)
+    if code != 3 or "there is " + right not in warned: fail(wrong, code, warned)
 print(failures, "failures")
 sys.exit(failures != 0)
 PYTHON

@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
 /usr/bin/python3 - "${FLEXCOMP_BIN_DIR:?}/flexcomp" "${FLEXCOMP_SOURCE_DIR:?}" <<'PYTHON'
-import csv, json, math, os, random, subprocess, sys
+import csv, json, math, os, random, re, subprocess, sys
 flexcomp, root = sys.argv[1:]
 robot = root + "/host/robots/tx60l.yaml"
 truth = root + "/tests/data/tx60l_table1.yaml"
@@ -170,7 +170,7 @@ refuses("refl_order.txt", "logr.csv", "--unit", "mm", says=("--join", "order or 
 # One reflector of a pose was not seen: that pose is listed, the others are data.
 write("hole.txt", "// Units: mm\n" + "".join("Cell::%s_%s %s %s %s\n" % (m, l, *v) for m, l, v in four if (m, l) != ("P07", "C")) + "Cell::base1 1 2 3\n")
 told = imports("hole.txt", "logr.csv", "--names", "*::{pose}_{reflector}", says=("P07", "without reflector c", "base1", "a name of another kind"))
-if told["rows"] != 39 or len(told["points_without_joints"]) != 2 or told["joints_without_point"] != ["P07 (line 8)"]: fail(told)
+if told["rows"] != 39 or len(told["points_without_joints"]) != 4 or told["joints_without_point"] != ["P07 (line 8)"]: fail(told)
 
 # --- who has no partner is listed
 few = [l for l in open("log.csv") if not l.startswith(("P03", "P11"))]
@@ -205,7 +205,7 @@ write("map.yaml", "delimiter: ';'\ntime: Zeit\njoints:\n" + "".join(
     "  - {column: Achse_%d, unit: %s, sign: %d, offset_deg: %g}\n" % (j + 1, "rad" if j == 2 else "deg", sign[j], offset[j]) for j in range(6)) +
     "context: {payload_kg: Last}\n")
 # A log at 10 Hz while the arm stands still at each pose; the tracker's clock is 5 s behind.
-ten_hertz = [(k, iso(m + d / 10)) for k, m in enumerate(moments) for d in range(-4, 5)]
+ten_hertz = [(k, iso(m + d / 10) + "Z") for k, m in enumerate(moments) for d in range(-4, 5)]
 write("robot.log", log_text(ten_hertz))
 write("timed.csv", "Timestamp,X [mm],Y [mm],Z [mm]\n" + "".join("%sZ,%s\n" % (iso(m - 5 + 0.03), ",".join(r[c] for c in xyz)) for m, r in zip(moments, data)))
 told = imports("timed.csv", "robot.log", "--map", "map.yaml", "--join", "time", "--time-shift", "5", "--tolerance", "0.2", says=("by time",))
@@ -278,6 +278,284 @@ refuses("sa.txt", "log.csv", "--columns", "nam,x,y,z", says=("did you mean 'name
 refuses("refl.txt", "logr.csv", "--names", "{reflector}", says=("{pose}",))
 code, said, warned = run("import", "sa.txt", "--joints", "log.csv", "-o", "no.csv")
 if code != 2 or "--robot" not in warned: fail("without --robot:", code, warned)
+
+# --- numbers of options are finite
+for option in ("--tolerance", "--time-shift", "--coverage"):
+    for value in ("nan", "inf", "-inf", "1e999"):
+        refuses("timed.csv", "robot.log", "--map", "map.yaml", "--join", "time", "%s=%s" % (option, value), code=2, says=(option,))
+
+# --- units that contradict each other: of two sources none wins
+def log_as(path, *columns, before=""):
+    write(path, before + "point," + ",".join(columns) + "\n" + "".join("%s,%s\n" % (m, ",".join(r[c] for c in q)) for m, r in zip(names, data)))
+plain = ["q%d" % j for j in range(1, 7)]
+def points_as(path, header, before=""):
+    write(path, before + header + "\n" + "".join("%s,%s\n" % (m, ",".join(r[c] for c in xyz)) for m, r in zip(names, data)))
+def spread_as(path, before, more=""):
+    write(path, before + "".join("%s,%s%s\n" % (m, ",".join(r[c] for c in xyz), more) for m, r in zip(names, data)))
+points_as("pu.csv", "name,X [mm],Y [mm],Z [mm]", "Units: Inches\n")
+refuses("pu.csv", "log.csv", says=("pu.csv:2", "X [mm]", "in, as line 1", "mm"))
+points_as("pu.csv", "name,X [mm],Y [mm],Z [mm]", "Units: Millimeters\n")
+imports("pu.csv", "log.csv", "--unit", "mm")
+same("out.csv", data, q + xyz)
+for line in ("# Units: sigma um, coordinates mm\n", "# Units: mm, uncertainty in um\n", "# Units: in, mm\n", "// Units: mm / m\n", "# Units: Millimeters, deg, rad\n"):
+    spread_as("pu.csv", line)
+    refuses("pu.csv", "log.csv", says=("pu.csv:1", "one unit", line.strip("#/ \n")))
+spread_as("pu.csv", "# Units: furlongs\n")
+refuses("pu.csv", "log.csv", "--unit", "mm", says=("pu.csv:1", "furlongs"))
+spread_as("pu.csv", "# Units: Metric\n")
+imports("pu.csv", "log.csv", "--unit", "mm")
+refuses("pu.csv", "log.csv", says=("pu.csv:2", "--unit"))
+spread_as("pu.csv", "# Tracker unit 3, 5 m from the robot\n")
+refuses("pu.csv", "log.csv", says=("pu.csv:2", "--unit"))
+imports("pu.csv", "log.csv", "--unit", "mm")
+same("out.csv", data, q + xyz)
+for line, scale in (("# Units: mm", 1), ("# Unit = mm", 1), ("# Units are in millimetres", 1), ("# units in mm", 1), ("# Units mm, deg", 1), ("# Unit of length: mm", 1),
+                    ("# Units: Millimeters, Degrees, Fahrenheit", 1), ("# Units: angles in deg, lengths in mm", 1), ("# Units: in, deg", 25.4), ("# Units are in in", 25.4),
+                    ("# Einheit: mm", 1), ("# Tracker unit 3, units: mm", 1)):
+    spread_as("pu.csv", line + "\n")
+    imports("pu.csv", "log.csv")
+    same("out.csv", [dict(r, **{c: str(scale * float(r[c])) for c in xyz}) for r in data], xyz, 1e-7)
+log_as("lu.csv", *["J%d [deg]" % j for j in range(1, 7)], before="# Units: rad\n")
+refuses("sa.txt", "lu.csv", says=("lu.csv:2", "J1 [deg]", "rad, as line 1"))
+log_as("lu.csv", *plain, before="# Units: deg\n# Units: rad\n")
+refuses("sa.txt", "lu.csv", says=("lu.csv:2", "same units"))
+log_as("lu.csv", *plain, before="# Units: deg\n")
+imports("sa.txt", "lu.csv")
+refuses("sa.txt", "lu.csv", "--joint-unit", "rad", says=("lu.csv", "--joint-unit", "line 1", "deg"))
+def map_of(path, units):
+    write(path, "joints:\n" + "".join("  - {column: q%d%s}\n" % (j + 1, ", unit: " + units[j] if j < len(units) else "") for j in range(6)) )
+map_of("mu.yaml", ["rad"])
+refuses("sa.txt", "lu.csv", "--map", "mu.yaml", says=("lu.csv:2", "q1", "mu.yaml", "rad", "deg"))
+log_as("lu.csv", *plain)
+map_of("mu.yaml", ["deg"] * 6)
+imports("sa.txt", "lu.csv", "--map", "mu.yaml")
+imports("sa.txt", "lu.csv", "--map", "mu.yaml", "--joint-unit", "deg")
+refuses("sa.txt", "lu.csv", "--map", "mu.yaml", "--joint-unit", "rad", says=("lu.csv:1", "q1", "mu.yaml", "--joint-unit"))
+map_of("mu.yaml", ["deg"])
+imports("sa.txt", "lu.csv", "--map", "mu.yaml", "--joint-unit", "deg")
+
+# --- units that are not understood
+for unit in ("mrad", "grad", "V", "deg/s", "1e-3 deg"):
+    log_as("lu.csv", *["J%d [%s]" % (j, unit) for j in range(1, 7)])
+    refuses("sa.txt", "lu.csv", "--joint-unit", "deg", says=("lu.csv:1", "J1 [%s]" % unit, "deg or rad"))
+    refuses("sa.txt", "lu.csv", "--joint-columns", ",".join("J%d [%s]" % (j, unit) for j in range(1, 7)), "--joint-unit", "deg", says=("lu.csv:1", "J1 [%s]" % unit, "deg or rad"))
+def with_column(path, name, cells, joints=q, before=""):
+    write(path, before + "point,%s,%s\n" % (",".join(joints), name) + "".join("%s,%s,%s\n" % (m, ",".join(r[c] for c in q), cells(k)) for k, (m, r) in enumerate(zip(names, data))))
+for key, column, cell in (("payload_kg", "Last [g]", "3000"), ("temp_c", "Temp [F]", "68"), ("payload_kg", "Last_g", "3000"), ("move1_deg", "Weg [rad]", "0.1"), ("payload_x_mm", "Px (m)", "0.1"),
+                          ("fx_n", "Fx [kN]", "0.1")):
+    with_column("cu.csv", column, lambda k: cell)
+    write("mu.yaml", "context: {%s: '%s'}\n" % (key, column))
+    refuses("sa.txt", "cu.csv", "--map", "mu.yaml", says=("cu.csv:1", column, key))
+for key, column, cell in (("payload_kg", "Last [kg]", "3"), ("temp_c", "Temp [°C]", "20"), ("temp_c", "Temp", "20"), ("move1_deg", "Weg (degrees)", "1"), ("dir1", "Richtung", "1"), ("fx_n", "Fx [N]", "5")):
+    with_column("cu.csv", column, lambda k: cell)
+    write("mu.yaml", "context: {%s: '%s'}\n" % (key, column))
+    imports("sa.txt", "cu.csv", "--map", "mu.yaml")
+    if float(rows("out.csv")[0][key]) != float(cell): fail(key, rows("out.csv")[0])
+for column, how in (("Zeit [ms]", "{column: 'Zeit [ms]', unit: s}"), ("Zeit [min]", "'Zeit [min]'"), ("Zeit [min]", "{column: 'Zeit [min]', unit: s}")):
+    with_column("cu.csv", column, lambda k: 1000 * k)
+    write("mu.yaml", "time: %s\n" % how)
+    refuses("sa.txt", "cu.csv", "--map", "mu.yaml", says=("cu.csv:1", column, "s"))
+with_column("cu.csv", "Time [min]", lambda k: k)
+refuses("sa.txt", "cu.csv", says=("cu.csv:1", "Time [min]", "ms"))
+with_column("cu.csv", "Time [ms]", lambda k: 1000 * k)
+imports("sa.txt", "cu.csv")
+if float(rows("out.csv")[1]["time_s"]) != shuffled[1]: fail("ms", rows("out.csv")[1])
+with_column("cu.csv", "Time", lambda k: 1000 * k, before="# Units: deg, ms\n")
+imports("sa.txt", "cu.csv")
+if float(rows("out.csv")[1]["time_s"]) != shuffled[1]: fail("ms in a line above", rows("out.csv")[1])
+with_column("cu.csv", "Time [s]", lambda k: 1000 * k, before="# Units: deg, ms\n")
+refuses("sa.txt", "cu.csv", says=("cu.csv:2", "Time [s]", "line 1"))
+with_column("cu.csv", "Time [UTC]", lambda k: "12:00:%02d" % k)
+imports("sa.txt", "cu.csv")
+write("pt.csv", "Time [min],x_mm,y_mm,z_mm\n" + "".join("%d,%s\n" % (k, ",".join(r[c] for c in xyz)) for k, r in enumerate(data)))
+with_column("cu.csv", "Time", lambda k: k)
+refuses("pt.csv", "cu.csv", "--join", "time", says=("pt.csv:1", "Time [min]", "ms"))
+
+# --- columns of which two could be meant
+def log_of(path, header, cells, rows=data):
+    write(path, ",".join(header) + "\n" + "".join(",".join(cells(m, [r[c] for c in q])) + "\n" for m, r in zip(names, rows)))
+volts = ["A%d [V]" % j for j in range(1, 7)]
+log_of("two.csv", ["point"] + volts + ["J%d" % j for j in range(1, 7)], lambda m, v: [m] + ["1.5"] * 6 + v)
+imports("sa.txt", "two.csv", "--joint-unit", "deg", says=("joints J1 J2 J3 J4 J5 J6", "not read: A1 [V]"))
+same("out.csv", [data[k] for k in shuffled], q + xyz)
+log_of("two.csv", ["point"] + ["J%d [deg]" % j for j in range(1, 7)] + ["J%d [deg/s]" % j for j in range(1, 7)], lambda m, v: [m] + v + ["7"] * 6)
+imports("sa.txt", "two.csv")
+same("out.csv", [data[k] for k in shuffled], q + xyz)
+log_of("two.csv", ["point"] + q + ["j%d_deg" % j for j in range(1, 7)], lambda m, v: [m] + v + ["1.5"] * 6)
+refuses("sa.txt", "two.csv", says=("two.csv:1", "q1_deg", "j1_deg", "--map", "--joint-columns"))
+imports("sa.txt", "two.csv", "--joint-columns", ",".join(q))
+same("out.csv", [data[k] for k in shuffled], q + xyz)
+log_of("two.csv", ["point"] + q + ["q1_deg"], lambda m, v: [m] + v + ["1.5"])
+refuses("sa.txt", "two.csv", says=("two.csv:1", "q1_deg", "once"))
+refuses("sa.txt", "two.csv", "--joint-columns", ",".join(q), says=("two.csv:1", "q1_deg", "once"))
+log_of("two.csv", ["nr", "pose"] + q, lambda m, v: [str(int(m[1:]) % 40 + 1), m] + v)
+refuses("sa.txt", "two.csv", says=("two.csv:1", "nr", "pose", "--map"))
+imports("sa.csv", "two.csv", "--join", "order")
+write("mu.yaml", "name: pose\n")
+imports("sa.txt", "two.csv", "--map", "mu.yaml")
+same("out.csv", [data[k] for k in shuffled], q + xyz)
+log_of("two.csv", ["pose", "time", "timestamp"] + q, lambda m, v: [m, "1", "2"] + v)
+refuses("sa.txt", "two.csv", says=("two.csv:1", "time", "timestamp", "--map"))
+log_of("two.csv", ["pose", "payload_kg", "payload_kg"] + q, lambda m, v: [m, "1", "2"] + v)
+refuses("sa.txt", "two.csv", says=("two.csv:1", "payload_kg", "once"))
+log_of("two.csv", ["pose", "comment", "comment"] + q, lambda m, v: [m, "1", "2"] + v)
+imports("sa.txt", "two.csv", says=("not read: comment, comment",))
+
+# --- a fourth number without header is no name
+spread_as("four.csv", "", ",0.015")
+refuses("four.csv", "log.csv", "--unit", "mm", "--join", "order", says=("four.csv:1", "--columns"))
+imports("four.csv", "log.csv", "--unit", "mm", "--join", "order", "--columns", "name,x,y,z,sigma")
+same("out.csv", [dict(r, sigma_mm="0.015") for r in data], q + xyz + ["sigma_mm"])
+for first in ("100.5", "1e3", "1E-3"):
+    write("four.csv", "".join("%s,%s\n" % (first, ",".join(r[c] for c in xyz)) for r in data))
+    refuses("four.csv", "log.csv", "--unit", "mm", "--join", "order", says=("four.csv:1", first, "--columns"))
+write("four.csv", "".join("%s;%s\n" % (m, ";".join([comma(r[c]) for c in xyz] + ["0,015"])) for m, r in zip(names, data)))
+refuses("four.csv", "log.csv", "--unit", "mm", "--join", "order", says=("four.csv:1", "--columns"))
+write("four.csv", "".join("Day1,%d,%s\n" % (k, ",".join(r[c] for c in xyz)) for k, r in enumerate(data)))
+refuses("four.csv", "log.csv", "--unit", "mm", "--join", "order", says=("four.csv:1", "--columns"))
+imports("four.csv", "log.csv", "--unit", "mm", "--join", "order", "--columns", "group,name,x,y,z")
+write("four.csv", "".join("%d,%s\n" % (k, ",".join(r[c] for c in xyz)) for k, r in enumerate(data)))
+imports("four.csv", "log.csv", "--unit", "mm", "--join", "order")
+same("out.csv", data, q + xyz)
+
+# --- options that do not apply
+timed = ("timed.csv", "robot.log", "--map", "map.yaml", "--time-shift", "5", "--tolerance", "0.2", "--join", "time")
+for more in (("--reflectors", "3"), ("--names", "{pose}_{reflector}"), ("--repeats",)):
+    refuses(*timed, *more, code=2, says=(more[0], "--join"))
+for join, more in (("order", ("--names", "{pose}")), ("order", ("--repeats",)), ("order", ("--tolerance", "1")), ("order", ("--time-shift", "1")),
+                   ("name", ("--reflectors", "3")), ("name", ("--tolerance", "1")), ("name", ("--time-shift", "0"))):
+    refuses("sa.txt", "log.csv", "--join", join, *more, code=2, says=(more[0], "--join"))
+refuses("sa.txt", "log.csv", "--reflectors", "4", code=2, says=("--reflectors", "--join order"))
+refuses("sa.txt", "log.csv", "--angles", "fixed-xyz", says=("sa.txt", "--angles", "rx"))
+refuses("sa.txt", "log.csv", "--angle-unit", "deg", says=("sa.txt", "--angle-unit"))
+refuses("sa.txt", "log.csv", "--coverage", "2", says=("sa.txt", "--coverage", "sigma"))
+for more in (("--unit", "mm"), ("--join", "time"), ("--robot", robot), ("--repeats",), ("--map", "map.yaml"), ("--tolerance", "1")):
+    code, said, warned = run("import", root + "/tests/data/tx60l.urdf", "-o", "no.yaml", *more)
+    if code != 2 or more[0] not in warned or "--joints" not in warned: fail("a URDF with", more, "gives", code, warned)
+    if os.path.exists("no.yaml"): fail("a refused import leaves a file")
+
+# --- thousands or decimals
+for gap, quote in ((",", '"'), (";", ""), (";", '"'), ("\t", "")):
+    cell = lambda v: quote + v + quote
+    write("k.txt", "\n".join(gap.join([m] + [cell(v) for v in r]) for m, r in (("P01", ("1,234", "5,678", "9,012")), ("P02", ("2,234", "5,678", "850")))) + "\n")
+    refuses("k.txt", "log.csv", "--unit", "mm", says=("k.txt:1", "'1,234'", "--decimal"))
+    imports("k.txt", "log.csv", "--unit", "mm", "--decimal", "comma")
+    if float(rows("out.csv")[0]["x_mm"]) != 1.234: fail(rows("out.csv")[0])
+    refuses("k.txt", "log.csv", "--unit", "mm", "--decimal", "point", says=("k.txt", "1,234"))
+    # What cannot part thousands is a decimal comma: another number of digits behind it, a zero or four digits before it.
+    for sure in ("1,2", "1,2345", "0,123", "-0,123", "1234,567", "-12,3456"):
+        write("k.txt", "\n".join(gap.join([m] + [cell(v) for v in r]) for m, r in (("P01", ("1,234", "5,678", "9,012")), ("P02", ("2,234", sure, "850")))) + "\n")
+        imports("k.txt", "log.csv", "--unit", "mm")
+        if float(rows("out.csv")[1]["y_mm"]) != float(sure.replace(",", ".")): fail(sure, rows("out.csv")[1])
+# A joint never turns a thousand degrees, but a payload may weigh 1,250 kg.
+write("kl.csv", "point;" + ";".join(q) + ";payload_kg\nP01;12,345;-45,000;90;0;1;2;1,250\nP02;1;2;3;4;5;6;2\n")
+write("k.txt", "P01 1.5 2.5 3.5\nP02 1.5 2.5 3.5\n")
+imports("k.txt", "kl.csv", "--unit", "mm")
+if [float(rows("out.csv")[0][c]) for c in ("q1_deg", "payload_kg")] != [12.345, 1.25]: fail(rows("out.csv")[0])
+write("kl.csv", open("kl.csv").read().replace("12,345", "12").replace("-45,000", "-45"))
+refuses("k.txt", "kl.csv", "--unit", "mm", says=("kl.csv:2", "payload_kg", "'1,250'", "decimal", "--map"))
+write("mu.yaml", "decimal: ','\n")
+imports("k.txt", "kl.csv", "--unit", "mm", "--map", "mu.yaml")
+
+# --- zones and midnight
+def clocks(path_points, path_log, of_point, of_row):
+    write(path_points, "time,x_mm,y_mm,z_mm\n" + "".join("%s,%s\n" % (of_point(k), ",".join(r[c] for c in xyz)) for k, r in enumerate(data)))
+    write(path_log, "time," + ",".join(q) + "\n" + "".join("%s,%s\n" % (of_row(k), ",".join(r[c] for c in q)) for k, r in enumerate(data)))
+zoned = lambda zone, hour=12: lambda k: "2026-03-01T%02d:00:%02d%s" % (hour, k, zone)
+clocks("zp.csv", "zl.csv", zoned("+01:00", 13), zoned(""))
+refuses("zp.csv", "zl.csv", "--join", "time", says=("zp.csv:2", "zone", "without"))
+clocks("zp.csv", "zl.csv", zoned(""), zoned("Z"))
+refuses("zp.csv", "zl.csv", "--join", "time", says=("zp.csv:2", "zone"))
+clocks("zp.csv", "zl.csv", zoned("+01:00", 13), lambda k: zoned("Z" if k != 3 else "")(k))
+refuses("zp.csv", "zl.csv", "--join", "time", says=("zl.csv:5", "zone"))
+log_of("zn.csv", ["pose", "time"] + q, lambda m, v: [m, zoned("Z" if m != "P04" else "")(int(m[1:]))] + v)
+refuses("sa.txt", "zn.csv", says=("zn.csv:5", "zone"))
+clocks("zp.csv", "zl.csv", zoned("+25:00", 13), zoned("Z"))
+refuses("zp.csv", "zl.csv", "--join", "time", says=("zp.csv:2", "+25:00"))
+for of_point, of_row in ((zoned(""), zoned("")), (zoned("+01:00", 13), zoned("Z")), (zoned("-0130", 10), zoned("+00", 11))):
+    clocks("zp.csv", "zl.csv", of_point, of_row)
+    if "-0130" in of_point(0): write("zp.csv", open("zp.csv").read().replace("T10:00", "T09:30"))
+    imports("zp.csv", "zl.csv", "--join", "time", "--tolerance", "0.2")
+    same("out.csv", data, q + xyz)
+around = lambda k: "%02d:%02d:00" % divmod((23 * 60 + 50 + k) % 1440, 60)
+log_of("zn.csv", ["pose", "time"] + q, lambda m, v: [m, around(int(m[1:]))] + v)
+refuses("sa.txt", "zn.csv", says=("zn.csv:11", "time", "00:00:00", "date"))
+clocks("zp.csv", "zl.csv", around, lambda k: "12:00:%02d" % k)
+refuses("zp.csv", "zl.csv", "--join", "time", says=("zp.csv:12", "00:00:00", "date"))
+clocks("zp.csv", "zl.csv", lambda k: "12:00:%02d" % k, lambda k: "12:00:%02d" % (39 - k))
+imports("zp.csv", "zl.csv", "--join", "time", "--tolerance", "0.2")
+same("out.csv", [{**data[39 - k], **{c: data[k][c] for c in xyz}} for k in range(n)], q + xyz)
+
+# --- two columns of the same uncertainty, and how figures are written
+write("su.csv", "name,x_mm,y_mm,z_mm,sigma [um],ux [um],uy [um],uz [um]\n" + "".join("%s,%s,99,15,15,15\n" % (m, ",".join(r[c] for c in xyz)) for m, r in zip(names, data)))
+imports("su.csv", "log.csv", says=("not read: sigma [um]",))
+if {r["sigma_mm"] for r in rows("out.csv")} != {"0.015"}: fail("sigma", rows("out.csv")[0])
+refuses("su.csv", "log.csv", "--columns", "name,x,y,z,sigma,sx,sy,sz", says=("su.csv:1", "--columns"))
+write("rs.txt", "// Units: mm\n// Name X Y Z sigma\n" + "".join("%s_%s %s %s %s 0.015\n" % (m, l, *v) for m, l, v in four))
+imports("rs.txt", "logr.csv", "--names", "{pose}_{reflector}")
+if {r["sigma_mm"] for r in rows("out.csv")} != {"0.015"}: fail("sigma of reflectors", rows("out.csv")[0])
+for tiny in ("1e-300", "1e-12", "0", "-1"):
+    write("su.csv", "name,x_mm,y_mm,z_mm,sigma\nP01,1,2,3,0.1\nP02,4,5,6,%s\n" % tiny)
+    refuses("su.csv", "log.csv", says=("su.csv:3", "sigma"))
+
+# --- text: Latin-1 as UTF-8, line ends
+for encoding in ("latin-1", "utf-8"):
+    write("la.csv", "Name,X [mm],Y [mm],Z [mm],Ux [µm],Uy [µm],Uz [µm]\n" + "".join("Prüf%s,%s,15,15,15\n" % (m, ",".join(r[c] for c in xyz)) for m, r in zip(names, data)), encoding)
+    write("ll.csv", "point," + ",".join(q) + "\n" + "".join("Prüf%s,%s\n" % (m, ",".join(r[c] for c in q)) for m, r in zip(names, data)), "utf-8" if encoding == "latin-1" else "latin-1")
+    told = imports("la.csv", "ll.csv")
+    same("out.csv", [dict(r, sigma_mm="0.015") for r in data], q + xyz + ["sigma_mm"])
+    if rows("out.csv")[0]["point"] != "PrüfP01": fail(rows("out.csv")[0])
+write("cr.txt", open("sa.txt").read().replace("\n", "\r"))
+write("crl.csv", open("log.csv").read().replace("\n", "\r"))
+imports("cr.txt", "crl.csv")
+same("out.csv", [data[k] for k in shuffled], q + xyz)
+write("cr.txt", open("sa.txt").read().replace("\n", "\r", 6))
+refuses("cr.txt", "log.csv", says=("cr.txt:1", "CR alone"))
+code, said, warned = run("import", "cr.txt", "--joints", "log.csv", "--robot", robot, "-o", "no.csv")
+if "\r" in warned: fail("raw CR", repr(warned))
+
+# --- a list of what has no partner has an end; the count tells points
+long_log = "point," + ",".join(q) + "\n" + "".join("%s,%s\n" % ("P%02d" % (k + 1) if k < n else "R%d" % k, ",".join(data[k % n][c] for c in q)) for k in range(2040))
+write("long.csv", long_log)
+code, said, warned = run("import", "sa.csv", "--joints", "long.csv", "--robot", robot, "-o", "out.csv", "--json", "out.json")
+told = json.load(open("out.json"))
+if code or len(told["joints_without_point"]) != 2000 or len(said.split("\n")) > 30 or "1980 more" not in said: fail("a long list", code, said[:300], warned)
+
+# --- names: reflectors that some poses have and most have not; patterns
+three = "".join("%s_%s %s %s %s\n" % (m, l, *v) for m, l, v in four if l != "D")
+write("stray.txt", "// Units: mm\n" + three + "P02_d 1 2 3\n")
+refuses("stray.txt", "logr.csv", "--names", "{pose}_{reflector}", says=("stray.txt:122", "P02_d", "39 poses", "this pose alone"))
+write("stray.txt", "// Units: mm\n" + three)
+imports("stray.txt", "logr.csv", "--names", "{pose}_{reflector}")
+for pattern in ("*{pose}_{reflector}", "{pose}*", "{pose}*_{reflector}"):
+    refuses("refl.txt", "logr.csv", "--names", pattern, says=("--names", "between * and {pose}"))
+huge = "A" * 150000 + "::" + "B" * 150000
+write("huge.txt", "// Units: mm\n" + three + huge + "_a 1 2 3\n")
+for pattern, status in (("{pose}_{reflector}", 0), ("*_{reflector}::{pose}", 3), ("*A*A*::{pose}B_{reflector}", 3), ("*::{pose}_{reflector}", 3)):
+    code, said, warned = run("import", "huge.txt", "--joints", "logr.csv", "--robot", robot, "--names", pattern, "-o", "out.csv")
+    if code != status: fail("a name of 300 kB with", pattern, "ends with", code, warned[:200])
+# A pattern takes a name apart as the same regular expression does.
+dice = random.Random(11)
+matched = 0
+for _ in range(40):
+    text = lambda: "".join(dice.choice("ab_:") for _ in range(dice.randint(1, 2)))
+    pattern = dice.choice(["", text(), "*" + text(), "**" + text()]) + "{pose}" + dice.choice(["", text(), text() + "*", text() + "*" + text()])
+    name = "P" + "".join(dice.choice("ab_:") for _ in range(dice.randint(3, 14)))
+    wanted = re.fullmatch(re.escape(pattern).replace(r"\*", ".*").replace(r"\{pose\}", "(.+)"), name)
+    poses_of_log = [wanted.group(1)] if wanted else sorted({name[i:j] for i in range(len(name)) for j in range(i + 1, len(name) + 1)})
+    write("np.csv", "name,x_mm,y_mm,z_mm\n%s,1,2,3\n" % name)
+    write("nl.csv", "pose," + ",".join(q) + "\n" + "".join("%s,%s\n" % (p, ",".join(data[k % n][c] for c in q)) for k, p in enumerate(poses_of_log)))
+    code, said, warned = run("import", "np.csv", "--joints", "nl.csv", "--robot", robot, "--names", pattern, "-o", "out.csv")
+    if code != (0 if wanted else 3): fail(name, "with", pattern, "is", wanted, "and gives", code, warned)
+    matched += wanted is not None
+if not 5 < matched < 35: fail("names that match:", matched)
+
+# --- no data file over what it is made of
+for more in (("-o", "sa.txt"), ("-o", "log.csv"), ("-o", "./log.csv"), ("-o", "mu.yaml", "--map", "mu.yaml"), ("-o", "out.csv", "--json", "out.csv"), ("-o", "out.csv", "--json", "sa.txt")):
+    before = {f: open(f).read() for f in ("sa.txt", "log.csv", "mu.yaml")}
+    code, said, warned = run("import", "sa.txt", "--joints", "log.csv", "--robot", robot, *more)
+    if code != 2 or more[-2] not in warned and more[0] not in warned: fail("import", more, "gives", code, warned)
+    if before != {f: open(f).read() for f in before}: fail("import", more, "wrote over what it read")
 
 # Whatever becomes of an export: data, or a refusal that names it.
 taken = 0
