@@ -1,11 +1,13 @@
 #include "commands/import_measurements.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "files/data_file.hpp"
 #include "files/declared_unit.hpp"
@@ -41,19 +43,26 @@ std::optional<Value> chosen(const std::map<std::string, Value>& names, const std
 }
 
 /// Asks the reader of data files about the text; what it refuses is said with the line of the log that it came from.
-std::vector<std::string> checked(const std::string& text, const std::string& beside, const RobotFile& robot,
+std::vector<std::string> checked(const std::string& text, const std::string& out, const RobotFile& robot,
                                  const RobotLog& log, const Joining& joining, bool force) {
-  const std::string path = fmt::format("{}.check-{}", beside, ::getpid());
+  std::string folder = (std::filesystem::temp_directory_path() / "flexcomp-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr)
+    throw std::runtime_error(fmt::format("{}: cannot be made: {}", folder, std::strerror(errno)));
   struct Remove {
-    const std::string& path;
+    const std::string& folder;
     ~Remove() {
       std::error_code ignored;
-      std::filesystem::remove(path, ignored);
+      std::filesystem::remove_all(folder, ignored);
     }
-  } remove{path};
+  } remove{folder};
+  const std::string path = folder + "/data.csv";
   write_file(path, text);
   try {
-    return load_data(path, robot, {force}).warnings;
+    std::vector<std::string> warnings = load_data(path, robot, {force}).warnings;
+    for (std::string& w : warnings) {
+      if (w.starts_with(path)) w.replace(0, path.size(), out);
+    }
+    return warnings;
   } catch (const InputError& e) {
     const std::size_t line = e.line() < 2 ? 0 : joining.log_lines[e.line() - 2];
     throw InputError(log.path, line, e.field(), e.expected(), e.found());
