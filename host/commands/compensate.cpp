@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "commands/answers.hpp"
@@ -26,6 +28,7 @@
 #include "flexcomp/forward.hpp"
 #include "flexcomp/image.hpp"
 #include "flexcomp/model.hpp"
+#include "kinematics/arm_sides.hpp"
 #include "kinematics/nominal_inverse.hpp"
 #include "units.hpp"
 
@@ -95,6 +98,21 @@ TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFi
             solutions == 0
                 ? std::string("one that it does not reach")
                 : fmt::format("{} ways to reach it, none with the turns that it asks for", solutions));
+      }
+      // Only where several remain: there are programs whose cfx was never looked at.
+      if (all.size() > 1 && t.cfx) {
+        std::vector<std::array<double, joint_count>> as_said;
+        std::copy_if(all.begin(), all.end(), std::back_inserter(as_said), [&](const auto& q) {
+          const auto sides = arm_sides(robot_file.nominal, q);
+          return sides && fits_cfx(*sides, *t.cfx);
+        });
+        if (!as_said.empty()) {
+          all = std::move(as_said);
+        } else {
+          list.warnings.push_back(
+              fmt::format("{}:{}: {}{}cfx {} fits none of {} ways to reach the pose: the nearest is taken.",
+                          targets, t.line, t.name, t.name.empty() ? "" : ": ", *t.cfx, all.size()));
+        }
       }
       if (all.size() > 1 && !before) {
         throw InputError(targets, t.line, t.name,

@@ -221,7 +221,7 @@ class Krl : public Source {
   /// {TYPE: NAME value, …} in one line: returns what stands behind it.
   std::size_t aggregate(std::size_t begin, std::size_t depth) {
     if (depth == deepest)
-      throw error(begin, now_.name, fmt::format("at most {} aggregates in each other", deepest), "more");
+      throw error(begin, now_.assigned, fmt::format("at most {} aggregates in each other", deepest), "more");
     std::string type;
     Parts parts;
     int brackets = 0;
@@ -231,13 +231,14 @@ class Krl : public Source {
       const std::size_t word = end_of_word(all.begin);
       const std::string name = lower(text_.substr(all.begin, word - all.begin));
       const bool first = parts.emplace(name, trimmed({word, all.end})).second;
-      if (!first && !name.empty()) throw error(all.begin, now_.name, "each component once", name + " twice");
+      if (!first && !name.empty())
+        throw error(all.begin, now_.assigned, "each component once", name + " twice");
       start = end + 1;
     };
     std::size_t at = begin + 1;
     for (;;) {
       if (at >= text_.size() || text_[at] == '\n' || text_[at] == ';')
-        throw error(begin, now_.name, "an aggregate that ends with } in its line", "none");
+        throw error(begin, now_.assigned, "an aggregate that ends with } in its line", "none");
       const char c = text_[at];
       if (c == '"') {
         at = behind_string(at);
@@ -725,6 +726,7 @@ class Rapid : public Source {
       found.quadrant_numbers = spans(l[2], 3);
       found.quadrant.emplace();
       for (std::size_t k = 0; k < 3; ++k) (*found.quadrant)[k] = whole(found.quadrant_numbers[k]);
+      if (const int cfx = whole(l[2].items[3].span); cfx >= 0 && cfx < 8) found.cfx = cfx;
     }
     program_.targets.push_back(std::move(found));
   }
@@ -733,8 +735,7 @@ class Rapid : public Source {
     constexpr int most = 8;  // quarter turns: two full ones
     const double value = number(s, unit::si, "robconf");
     if (std::abs(value) > most || value != std::floor(value))
-      throw error(s.begin, "robconf", "a whole number of quarter turns, -8 … 8",
-                  fmt::format("'{}'", view(s)));
+      throw error(s.begin, "robconf", "a whole number, -8 … 8", fmt::format("'{}'", view(s)));
     return static_cast<int>(value);
   }
 

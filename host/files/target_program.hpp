@@ -33,6 +33,8 @@ struct ProgramTarget {
   std::optional<unsigned> turn;
   std::optional<std::array<int, 3>> quadrant;  ///< ABB's cf1, cf4, cf6: quarter turns of joints 1, 4, 6
 
+  std::optional<int> cfx;  ///< ABB's, where it is 0 … 7
+
   struct Span {
     std::size_t begin = 0;
     std::size_t end = 0;
