@@ -127,23 +127,17 @@ class Krl : public Source {
 
   /// What stands in a line before an aggregate, outside of all braces.
   struct Statement {
-    std::vector<std::string> words;  ///< small letters
-    std::string name;                ///< the last word outside of brackets, as written
-    std::string assigned;            ///< the name before =
-    std::string type;                ///< of what is declared
-    bool relative = false;           ///< PTP_REL …
-    bool operation = false;          ///< behind the geometric operator
+    std::array<std::string, 3> last;  ///< words, small letters, the newest in front
+    std::string name;                 ///< the last word outside of brackets, as written
+    std::string assigned;             ///< the name before =
+    std::string type;                 ///< of what is declared
+    bool motion = false;              ///< PTP, LIN …
+    bool structure = false;           ///< STRUC, whose words are no variables
+    bool relative = false;            ///< PTP_REL …
+    bool operation = false;           ///< behind the geometric operator
     int brackets = 0;
 
-    bool says(std::string_view word) const {
-      return std::find(words.begin(), words.end(), word) != words.end();
-    }
-    bool moves() const {
-      static constexpr std::array<std::string_view, 7> moving{"ptp",  "lin",   "circ", "sptp",
-                                                              "slin", "scirc", "spl"};
-      return assigned.empty() &&
-             std::any_of(moving.begin(), moving.end(), [this](std::string_view m) { return says(m); });
-    }
+    bool moves() const { return motion && assigned.empty(); }
   };
 
   static bool is_position(const std::string& type) { return type == "e6pos" || type == "pos"; }
@@ -182,18 +176,22 @@ class Krl : public Source {
   void word(std::size_t begin, std::size_t end) {
     const std::string_view written = text_.substr(begin, end - begin);
     const std::string small = lower(written);
-    now_.words.push_back(small);
-    const std::size_t n = now_.words.size();
+    std::rotate(now_.last.begin(), now_.last.end() - 1, now_.last.end());
+    now_.last[0] = small;
+    static constexpr std::array<std::string_view, 7> motions{"ptp",  "lin",   "circ", "sptp",
+                                                             "slin", "scirc", "spl"};
+    now_.motion = now_.motion || std::find(motions.begin(), motions.end(), small) != motions.end();
+    now_.structure = now_.structure || small == "struc";
     // BAS(#TOOL,3)
-    if (n >= 3 && now_.words[n - 3] == "bas" && (now_.words[n - 2] == "tool" || now_.words[n - 2] == "base"))
-      (now_.words[n - 2] == "tool" ? tools_ : bases_)
-          .emplace(fmt::format("{}_data[{}]", now_.words[n - 2], small), begin);
+    if (now_.last[2] == "bas" && (now_.last[1] == "tool" || now_.last[1] == "base"))
+      (now_.last[1] == "tool" ? tools_ : bases_)
+          .emplace(fmt::format("{}_data[{}]", now_.last[1], small), begin);
     if (now_.brackets != 0) return;
     now_.name = std::string(written);
     if (now_.relative || now_.operation) parts_of_moves_.emplace(small, begin);
     now_.operation = false;
     if (small.ends_with("_rel") && now_.assigned.empty()) now_.relative = true;
-    if (!now_.type.empty() && !now_.says("struc")) declared_[small] = now_.type;
+    if (!now_.type.empty() && !now_.structure) declared_[small] = now_.type;
     if (is_position(small) || is_axes(small) || small == "frame") now_.type = small;
   }
 
@@ -206,7 +204,7 @@ class Krl : public Source {
     // $TOOL=… as well as $TOOL.X=…
     for (auto& [variable, names] : {std::pair("$tool", &tools_), std::pair("$base", &bases_)}) {
       const bool whole = lower(now_.name) == variable;
-      if (!whole && !(now_.words.size() >= 2 && now_.words[now_.words.size() - 2] == variable)) continue;
+      if (!whole && now_.last[1] != variable) continue;
       std::size_t end = at + 1;
       for (int depth = 0; end < text_.size(); ++end) {
         const char c = text_[end];

@@ -4,11 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <array>
 #include <cstddef>
-#include <functional>
+#include <ctime>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "files/target_program.hpp"
@@ -357,15 +358,15 @@ TEST(Val3, OnlyJointPositionsAreRewritten) {
   refuses(val3, "<Data type=\"jointRx\"><Value" + j + "/>\n<Value j1=\"1>", 2, "ends with >");
 }
 
-/// Seconds that reading takes; refused or not.
+/// Seconds of this processor that reading takes, whatever else the machine does; refused or not.
 template <class Read>
 double seconds(const Read& read, const std::string& text) {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   try {
     read(text);
   } catch (const InputError&) {
   }
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
 TEST(Programs, AreReadInATimeThatGrowsWithTheirLengthAlone) {
@@ -376,6 +377,9 @@ TEST(Programs, AreReadInATimeThatGrowsWithTheirLengthAlone) {
   std::string one_line = "XS={";
   for (int k = 0; k < 40000; ++k) one_line += "P {E6POS: X 1,Y 2,Z 3,A 4,B 5,C 6},";
   refuses(krl, one_line + "V 1}\n", 1, "once");
+  one_line = "PTP ";
+  for (int k = 0; k < 40000; ++k) one_line += "P" + axes + " ";
+  EXPECT_LT(seconds(krl, one_line), 10);
   std::string modules;
   for (int k = 0; k < 20000; ++k) modules += "MoveAbsJ " + joints + ",v1,z1,t;\n";
   EXPECT_LT(seconds(rapid, modules), 10);
@@ -403,7 +407,7 @@ TEST(Programs, HaveNoTextThatMakesReadingFailOtherwise) {
        "j6='6'/><![CDATA[>]]></Data>\n"}};
   std::mt19937_64 random(3);
   int read = 0;
-  for (int k = 0; k < 6000; ++k) {
+  for (int k = 0; k < 3000; ++k) {
     const auto& [language, text] = good[static_cast<std::size_t>(k) % 3];
     std::string changed = text;
     for (std::size_t n = 1 + random() % 3; n > 0; --n) {
@@ -435,7 +439,7 @@ TEST(Programs, HaveNoTextThatMakesReadingFailOtherwise) {
       FAIL() << e.what() << "\n" << changed;
     }
   }
-  EXPECT_GT(read, 500);
+  EXPECT_GT(read, 250);
 }
 
 }  // namespace
