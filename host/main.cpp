@@ -39,8 +39,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Rigid-flexible calibration of robot arms: from measured points to corrected joint commands in the "
       "controller.\n"
-      "Exit status: 0 done; 2 usage; 3 input refused; 4 the bus or the device refused or did not answer; 5 "
-      "done, but the "
+      "Exit status: 0 done; 1 a fault of the machine or of this program (a file that cannot be written); 2 "
+      "usage; 3 input refused; 4 the bus or the device refused or did not answer; 5 done, but the "
       "result is not trustworthy.",
       "flexcomp"};
   app.set_version_flag("--version", "flexcomp " FLEXCOMP_VERSION);

@@ -4,17 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "commands/answers.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/numbers.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
@@ -26,6 +29,7 @@
 #include "flexcomp/forward.hpp"
 #include "flexcomp/image.hpp"
 #include "flexcomp/model.hpp"
+#include "kinematics/arm_sides.hpp"
 #include "kinematics/nominal_inverse.hpp"
 #include "units.hpp"
 
@@ -63,20 +67,6 @@ Pose<double> Compensate::program_frame() const {
                              radians(frame[4]), radians(frame[5])});
 }
 
-/// Whether readings are those that the target's words ask for; a reading at the edge counts to both sides.
-bool fits(const ProgramTarget& target, const std::array<double, joint_count>& q) {
-  constexpr double edge = 1e-6;
-  for (std::size_t j = 0; target.turn && j < joint_count; ++j) {
-    if (std::abs(q[j]) > edge && (q[j] < 0) != ((*target.turn >> j & 1U) != 0)) return false;
-  }
-  const std::array<std::size_t, 3> joints{0, 3, 5};
-  for (std::size_t k = 0; target.quadrant && k < 3; ++k) {
-    const double quarters = q[joints[k]] / (pi / 2) - (*target.quadrant)[k];
-    if (quarters < -edge || quarters > 1 + edge) return false;
-  }
-  return true;
-}
-
 /// The program's targets as joint commands. A pose is taken on the branch that its words name; where several remain, on
 /// the one that is nearest to the command before.
 TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFile& robot_file) const {
@@ -101,7 +91,7 @@ TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFi
                               turned * (t.position_m - f0.position)};
       std::vector<std::array<double, joint_count>> all = nominal_inverses(robot_file.nominal, pose);
       const std::size_t solutions = all.size();
-      std::erase_if(all, [&t](const auto& q) { return !fits(t, q); });
+      std::erase_if(all, [&t](const auto& q) { return !words_fit(t, q); });
       if (all.empty()) {
         throw InputError(
             targets, t.line, t.name,
@@ -109,6 +99,21 @@ TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFi
             solutions == 0
                 ? std::string("one that it does not reach")
                 : fmt::format("{} ways to reach it, none with the turns that it asks for", solutions));
+      }
+      // Only where several remain: there are programs whose cfx was never looked at.
+      if (all.size() > 1 && t.cfx) {
+        std::vector<std::array<double, joint_count>> as_said;
+        std::copy_if(all.begin(), all.end(), std::back_inserter(as_said), [&](const auto& q) {
+          const auto sides = arm_sides(robot_file.nominal, q);
+          return sides && fits_cfx(*sides, *t.cfx);
+        });
+        if (!as_said.empty()) {
+          all = std::move(as_said);
+        } else {
+          list.warnings.push_back(
+              fmt::format("{}:{}: {}{}cfx {} fits none of {} ways to reach the pose: the nearest is taken.",
+                          targets, t.line, t.name, t.name.empty() ? "" : ": ", *t.cfx, all.size()));
+        }
       }
       if (all.size() > 1 && !before) {
         throw InputError(targets, t.line, t.name,
@@ -146,13 +151,15 @@ std::string Compensate::to_program(const TargetProgram& program, const RobotFile
     const Pose<double> pose = f0 * nominal_forward(nominal, t.q_rad);
     t.position_m = pose.position;
     t.orientation = unit_quaternion(pose.rotation);
-    if (t.turn) t.turn = turn_of(t.q_rad);
-    if (t.quadrant) t.quadrant = quadrants_of(t.q_rad);
+    if (t.turn) t.turn = turn_of(t.q_rad, *t.turn);
+    if (t.quadrant) t.quadrant = quadrants_of(t.q_rad, *t.quadrant);
   }
   return program_text(program, corrected);
 }
 
 void Compensate::run() const {
+  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--targets", targets}},
+                   {{"-o", out}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   const Calibration set = load_calibration(calibration, robot_file);
   std::optional<ProgramLanguage> language = program_language(targets);
@@ -243,7 +250,8 @@ void add_compensate(CLI::App& app) {
       ->type_name("Q1,…,Q6");
   command
       ->add_option("--frame", options->frame,
-                   "Where F0 is in the frame of a program's poses: x,y,z,rx,ry,rz [mm, deg]")
+                   "Where F0 is in the frame of a program's poses: x,y,z,rx,ry,rz [mm, deg], turned by "
+                   "Rot(z,rz) Rot(y,ry) Rot(x,rx)")
       ->delimiter(',')
       ->expected(6)
       ->check(finite_number())

@@ -1,4 +1,5 @@
 #include "diagnosis/diagnose.hpp"
+#include "commands/outputs.hpp"
 
 #include <fmt/format.h>
 
@@ -98,6 +99,9 @@ bool Diagnose::write_plan(const Diagnosis& d, const RobotFile& robot_file) const
 }
 
 void Diagnose::run() const {
+  refuse_same_file(
+      {{"--robot", robot}, {"--calibration", calibration}, {"--data", data}, {"--holdout", holdout}},
+      {{"-o", out}, {"--plan", plan}, {"--report", report}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   DiagnoseOptions options;
   if (!calibration.empty()) options.start = load_calibration(calibration, robot_file);

@@ -9,6 +9,7 @@
 #include "bus/bus_files.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/robot_header.hpp"
@@ -47,6 +48,8 @@ void Export::need(const std::string& value, const char* option) const {
 }
 
 void Export::run() const {
+  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--urdf", urdf}},
+                   {{"-o", out}, {"--json", common.json}});
   if (format == "c") c_header();
   if (format == "urdf") corrected_urdf();
   if (format == "eds") data_sheet();

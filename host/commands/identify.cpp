@@ -1,4 +1,5 @@
 #include "identification/identify.hpp"
+#include "commands/outputs.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -160,6 +161,8 @@ nlohmann::ordered_json repeats_json(const std::optional<PureError>& e) {
 }
 
 void Identify::run() const {
+  refuse_same_file({{"--robot", robot}, {"--data", data}, {"--tolerances", tolerances}},
+                   {{"-o", out}, {"--report", report}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   const DataFile file = load_data(data, robot_file, {force});
   std::vector<std::string> warnings = file.warnings;

@@ -1,12 +1,15 @@
 #include "commands/import_measurements.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "commands/numbers.hpp"
 #include "files/data_file.hpp"
@@ -44,20 +47,27 @@ std::optional<Value> chosen(const std::map<std::string, Value>& names, const std
 }
 
 /// Asks the reader of data files about the text; what it refuses is said with the line of the file that it came from.
-std::vector<std::string> checked(const std::string& text, const std::string& beside, const RobotFile& robot,
+std::vector<std::string> checked(const std::string& text, const std::string& out, const RobotFile& robot,
                                  const PointList& points, const RobotLog& log, const Joining& joining,
                                  bool force) {
-  const std::string path = fmt::format("{}.check-{}", beside, ::getpid());
+  std::string folder = (std::filesystem::temp_directory_path() / "flexcomp-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr)
+    throw std::runtime_error(fmt::format("{}: cannot be made: {}", folder, std::strerror(errno)));
   struct Remove {
-    const std::string& path;
+    const std::string& folder;
     ~Remove() {
       std::error_code ignored;
-      std::filesystem::remove(path, ignored);
+      std::filesystem::remove_all(folder, ignored);
     }
-  } remove{path};
+  } remove{folder};
+  const std::string path = folder + "/data.csv";
   write_file(path, text);
   try {
-    return load_data(path, robot, {force}).warnings;
+    std::vector<std::string> warnings = load_data(path, robot, {force}).warnings;
+    for (std::string& w : warnings) {
+      if (w.starts_with(path)) w.replace(0, path.size(), out);
+    }
+    return warnings;
   } catch (const InputError& e) {
     std::vector<std::string> of_log = joint_and_context_names(joining.data.columns);
     of_log.insert(of_log.end(), log.context.begin(), log.context.end());

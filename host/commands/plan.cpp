@@ -18,6 +18,7 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/numbers.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/cell_file.hpp"
@@ -375,6 +376,12 @@ nlohmann::ordered_json figures_json(const Criterion& criterion, const Figures& f
 }
 
 void Plan::run() {
+  refuse_same_file({{"--robot", robot}, {"--cell", cell}, {"--candidates", candidates}, {"--extend", extend}},
+                   {{"-o", out},
+                    {"--report", report},
+                    {"--state", state.empty() ? resume : state},
+                    {"--json", common.json}});
+  refuse_same_file({{"--resume", resume}}, {{"-o", out}, {"--report", report}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   if (!cell.empty()) cell_ = load_cell(cell);
   if (!robot_file.has_noise) {

@@ -6,6 +6,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/quaternion.hpp"
@@ -26,6 +27,8 @@ struct Predict {
 };
 
 void Predict::run() const {
+  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--joints", joints}},
+                   {{"-o", out}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   Calibration set;  // without a calibration: the nominal arm
   if (!calibration.empty()) set = load_calibration(calibration, robot_file);

@@ -10,6 +10,7 @@
 #include "commands/answers.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/data_file.hpp"
 #include "files/write_file.hpp"
@@ -51,6 +52,7 @@ wire::ProbeRequest request_of(const std::array<double, joint_count>& q_rad,
 }
 
 void Probe::run() const {
+  refuse_same_file({{"--robot", robot}, {"--targets", targets}}, {{"-o", out}, {"--json", bus.json}});
   const std::unique_ptr<ControllerClient> client = bus.connect();
   // Limits, seeds and the defaults of the context are the robot's.
   const RobotFile from = robot_of(*client, robot);

@@ -7,6 +7,7 @@
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
@@ -24,6 +25,7 @@ struct Pull {
   void run() const {
     if (out.empty() && image.empty())
       throw CLI::ValidationError("-o", "give a file to write, by -o or by --image");
+    refuse_same_file({{"--robot", robot}}, {{"-o", out}, {"--image", image}, {"--json", bus.json}});
     const std::unique_ptr<ControllerClient> client = bus.connect();
     Bytes bytes;
     {

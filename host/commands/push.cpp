@@ -16,6 +16,7 @@
 #include "commands/colour.hpp"
 #include "commands/commands.hpp"
 #include "commands/numbers.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/image.hpp"
@@ -90,12 +91,13 @@ void Push::show_changes() const {
     const std::unique_ptr<ControllerClient> client = bus.connect();
     for_robot = robot_of(*client, robot);
     const Bytes bytes = ready ? *ready : make(*client, left_out);
+    // A file that is no image is the file's fault; what a sound one asks for may be beyond the controller.
+    next = calibration_from_image(bytes, for_robot, set).terms;
     const std::vector<std::string> beyond = beyond_capability(client->capability(), bytes);
     if (!beyond.empty()) {
       throw BusError(fmt::format("{}: {} is more than this controller can do: {}; nothing was sent",
                                  client->where(), set, fmt::join(beyond, "; ")));
     }
-    next = calibration_from_image(bytes, for_robot, set).terms;
     const wire::Status status = client->status();
     Bytes active;
     if (status.active_slot != wire::no_slot) {
@@ -166,11 +168,15 @@ Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) c
 }
 
 void Push::run() const {
+  refuse_same_file({{"CAL.yaml", set}, {"--robot", robot}, {"--against", against}},
+                   {{"--image", image}, {"--json", bus.json}});
   const auto start = std::chrono::steady_clock::now();
   if (set.empty() != confirm)
     throw CLI::ValidationError("CAL.yaml", "give either a set to push or --confirm");
   if (!against.empty() && !dry_run)
     throw CLI::ValidationError("--against", "compares with a file, which only --dry-run does");
+  if (!against.empty() && to->count() != 0)
+    throw CLI::ValidationError("--against", "compares with a file: no --to with it");
   if (to->count() == 0 && against.empty()) throw CLI::RequiredError("--to");
   if (dry_run && (confirm || trial_s || !image.empty()))
     throw CLI::ValidationError("--dry-run",

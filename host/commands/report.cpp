@@ -12,6 +12,7 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/numbers.hpp"
+#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/csv.hpp"
 #include "files/input_error.hpp"
@@ -138,6 +139,7 @@ PageResult result_of(const std::string& text) {
 }
 
 void Report::run() const {
+  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}}, {{"-o", out}});
   const RobotFile robot_file = load_robot(robot);
   Page page;
   page.arm = robot_file;

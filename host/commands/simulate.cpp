@@ -12,6 +12,7 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/numbers.hpp"
+#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/input_error.hpp"
@@ -119,6 +120,8 @@ Measurement Simulate::random_place(std::size_t k, const RobotFile& robot_file,
 }
 
 void Simulate::run() const {
+  refuse_same_file({{"--robot", robot}, {"--truth", truth}, {"--joints", joints}},
+                   {{"-o", out}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   Calibration set = load_calibration(truth, robot_file);
   DataFile data;
@@ -211,7 +214,8 @@ void add_simulate(CLI::App& app) {
       ->capture_default_str();
   command
       ->add_option("--frame", options->frame,
-                   "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg]")
+                   "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg], turned by "
+                   "Rot(z,rz) Rot(y,ry) Rot(x,rx)")
       ->delimiter(',')
       ->expected(6)
       ->check(finite_number())

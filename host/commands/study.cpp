@@ -1,4 +1,5 @@
 #include "studies/study.hpp"
+#include "commands/outputs.hpp"
 
 #include <fmt/format.h>
 
@@ -128,6 +129,7 @@ Page page_of(const Study& study) {
 }
 
 void StudyCommand::run() const {
+  refuse_same_file({}, {{"--report", report}, {"--json", common.json}});
   StudyOptions options;
   if (arm != "rx160l") options.arms.push_back(paper_tx60l());
   if (arm != "tx60l") options.arms.push_back(paper_rx160l());

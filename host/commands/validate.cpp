@@ -1,4 +1,5 @@
 #include "identification/validate.hpp"
+#include "commands/outputs.hpp"
 
 #include <fmt/format.h>
 
@@ -30,6 +31,8 @@ struct Validate {
 };
 
 void Validate::run() const {
+  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--data", data}},
+                   {{"--report", report}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   const Calibration set = load_calibration(calibration, robot_file);
   const DataFile file = load_data(data, robot_file, {force});

@@ -29,8 +29,11 @@ struct ProgramTarget {
   std::array<double, joint_count> q_rad{};
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  std::optional<unsigned> turn;                ///< KUKA's T: bit j is set where joint j + 1 is negative
+  /// KUKA's T: bit j is set where joint j + 1 is negative; bits 6 … 11 are those of external axes.
+  std::optional<unsigned> turn;
   std::optional<std::array<int, 3>> quadrant;  ///< ABB's cf1, cf4, cf6: quarter turns of joints 1, 4, 6
+
+  std::optional<int> cfx;  ///< ABB's, where it is 0 … 7
 
   struct Span {
     std::size_t begin = 0;
@@ -46,7 +49,7 @@ struct TargetProgram {
   ProgramLanguage language = ProgramLanguage::kuka;
   std::string text;
   std::vector<ProgramTarget> targets;
-  std::vector<std::string> warnings;  ///< targets that were seen and cannot be corrected
+  std::vector<std::string> warnings;  ///< what was seen and is left as it is, or not right for all targets
 };
 
 /// By the ending of the file's name; nothing for .csv and others. \throws InputError  a .dat that cannot be read
@@ -56,12 +59,17 @@ std::optional<ProgramLanguage> program_language(const std::string& path);
 TargetProgram read_program(const std::string& path, ProgramLanguage language);
 
 /// The program with its targets put as in `corrected` (same order; q or pose, turn and quadrants): numbers with 6 decimals in
-/// mm and degrees.
+/// mm and degrees; words of the branch only where they change.
 std::string program_text(const TargetProgram& program, const std::vector<ProgramTarget>& corrected);
 
-/// What the words of a target say of these readings.
-unsigned turn_of(const std::array<double, joint_count>& q_rad);
-std::array<int, 3> quadrants_of(const std::array<double, joint_count>& q_rad);
+/// A reading so near to an edge of its half or quarter turn [rad] counts to both sides: poses are written with 6 decimals.
+constexpr double word_edge_rad = 1e-6;
+
+/// The words of a target for these readings: as `before` where that is still right, with the bits of external axes.
+unsigned turn_of(const std::array<double, joint_count>& q_rad, unsigned before);
+std::array<int, 3> quadrants_of(const std::array<double, joint_count>& q_rad, std::array<int, 3> before);
+/// Whether readings are those that the target's words ask for.
+bool words_fit(const ProgramTarget& target, const std::array<double, joint_count>& q_rad);
 
 }  // namespace flexcomp::host
 

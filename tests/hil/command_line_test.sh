@@ -128,9 +128,17 @@ try:
     if "0 change" not in done("flexcomp push --to %s --dry-run cal.yaml" % bus): fail("the same set")
     for bad, says in (("push --dry-run cal.yaml", "--to is required"), ("push --against active.yaml --to %s cal.yaml" % bus, "--dry-run"),
                       ("push --dry-run --confirm --to %s" % bus, "--dry-run"), ("push --dry-run --trial 3 --to %s cal.yaml" % bus, "--dry-run"),
-                      ("push --dry-run --against active.yaml cal.yaml", "--robot")):
+                      ("push --dry-run --against active.yaml cal.yaml", "--robot"),
+                      ("push --dry-run --against active.yaml --to %s --robot tx60l.yaml cal.yaml" % bus, "no --to"),
+                      ("pull --from %s -o p.yaml --image ./p.yaml" % bus, "another file"),
+                      ("predict --robot tx60l.yaml --joints others.csv -o others.csv", "another file")):
         code, said, warned = run("flexcomp " + bad)
         if code != 2 or says not in warned: fail(bad, code, warned)
+    # A file that is no image is refused as a file, with a controller as without one.
+    open("cut.bin", "wb").write(open("active.bin", "rb").read()[:-9])
+    for how in ("--to " + bus, "--against active.yaml --robot tx60l.yaml"):
+        code, said, warned = run("flexcomp push %s --dry-run cut.bin" % how)
+        if code != 3 or "cut.bin" not in warned or "more than" in warned: fail("a truncated image", how, code, warned)
     code, said, warned = run("flexcomp push --dry-run --against active.yaml --robot tx60l.yaml absent.yaml")
     if code != 3: fail(code, warned)
 
@@ -138,6 +146,10 @@ try:
     commands = re.search(r"Subcommands:\n(.*)", done("flexcomp --help"), re.S).group(1)
     commands = re.findall(r"^  ([a-z]+) ", commands, re.M)
     if len(commands) < 17: fail("commands", commands)
+    for status in "012345":
+        if not re.search(r"Exit status:.*\b%s " % status, done("flexcomp --help"), re.S): fail("--help does not tell status", status)
+    for command in ("simulate", "compensate"):
+        if "Rot(z,rz) Rot(y,ry) Rot(x,rx)" not in " ".join(done("flexcomp %s --help" % command).split()): fail(command, "--frame")
     examples = 0
     for command in commands:
         text = done(["flexcomp", command, "--help"])
