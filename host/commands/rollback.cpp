@@ -9,7 +9,7 @@
 namespace flexcomp::host {
 namespace {
 
-void run(const BusOptions& bus) {
+void roll_back(const BusOptions& bus) {
   const std::unique_ptr<ControllerClient> client = bus.connect();
   const std::uint32_t before = client->status().active_sequence;
   client->run(wire::Command::rollback);
@@ -27,7 +27,7 @@ void add_rollback(CLI::App& app) {
   CLI::App* command = app.add_subcommand("rollback", "Return a controller to the set that it had before");
   state->add_bus_to(*command, "--at");
   command->footer("Example:\n  flexcomp rollback --at can:vcan0:5");
-  command->callback([state] { run(*state); });
+  command->callback([state] { roll_back(*state); });
 }
 
 }  // namespace flexcomp::host

@@ -31,7 +31,7 @@ constexpr std::array<Fault, 4> fault_list{{
 
 std::string version(std::uint32_t v) { return fmt::format("{}.{}.{}", v >> 16U, v >> 8U & 0xFFU, v & 0xFFU); }
 
-void run(const BusOptions& bus) {
+void show_status(const BusOptions& bus) {
   const std::unique_ptr<ControllerClient> client = bus.connect();
   const wire::Capability& can = client->capability();
   const wire::Status now = client->status();
@@ -127,7 +127,7 @@ void add_status(CLI::App& app) {
   CLI::App* command = app.add_subcommand("status", "What a controller is, holds and does");
   state->add_bus_to(*command, "--of");
   command->footer("Example:\n  flexcomp status --of modbus-rtu:/dev/ttyUSB0:115200:N:3");
-  command->callback([state] { run(*state); });
+  command->callback([state] { show_status(*state); });
 }
 
 }  // namespace flexcomp::host

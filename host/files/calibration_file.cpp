@@ -28,9 +28,9 @@ constexpr std::size_t link_slot_count = 5;  // gamma has no constant part
 // --- reading ------------------------------------------------------------------------------------------------------
 
 /// Builds the terms of a file in its order.
-class Reader {
+class SetReader {
  public:
-  Reader(Calibration& calibration, const RobotFile& robot) : out_(calibration), robot_(robot) {}
+  SetReader(Calibration& calibration, const RobotFile& robot) : out_(calibration), robot_(robot) {}
 
   void geometric(const YamlField& list) {
     std::map<unsigned, std::size_t> seen;
@@ -274,7 +274,7 @@ class Reader {
   std::map<std::string, std::size_t> seen_;
 };
 
-const std::vector<std::pair<Factor, std::string>> Reader::factor_names{
+const std::vector<std::pair<Factor, std::string>> SetReader::factor_names{
     {Factor::load_torque, "load_torque"}, {Factor::temperature, "temperature"}, {Factor::payload, "payload"}};
 
 Frame read_frame(const YamlField& field) {
@@ -423,7 +423,7 @@ std::vector<std::string> selectors_text(const EffectId& id) {
   if (id.order != 0) parts.push_back("order: " + number(id.order, unit::si));
   if (id.effect == Effect::base_compliance) parts.push_back("pivot_z_mm: " + number(id.pivot_z_m, unit::mm));
   if (id.effect == Effect::reflector_slip) parts.push_back("after_s: " + number(id.after_s, unit::si));
-  for (const auto& [factor, factor_text] : Reader::factor_names) {
+  for (const auto& [factor, factor_text] : SetReader::factor_names) {
     if (id.effect == Effect::joint_curve && id.factor == factor) parts.push_back("factor: " + factor_text);
   }
   if (id.effect == Effect::unnamed) {
@@ -489,7 +489,7 @@ Calibration load_calibration(const std::string& path, const RobotFile& robot) {
   Calibration calibration;
   calibration.path = path;
   read_head(root, robot, calibration);
-  Reader reader(calibration, robot);
+  SetReader reader(calibration, robot);
   if (const auto field = root.find("geometric")) reader.geometric(*field);
   if (const auto field = root.find("base")) reader.constants(*field, body::base, 6);
   if (const auto field = root.find("tool")) reader.constants(*field, body::tool, 6);

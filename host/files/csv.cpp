@@ -7,16 +7,11 @@
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
 #include "files/read_file.hpp"
+#include "files/text.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-std::string_view trimmed(std::string_view s) {
-  const auto first = s.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return s.substr(first, s.find_last_not_of(" \t") - first + 1);
-}
 
 /// One line into cells.
 std::vector<std::string> split(std::string_view line, const std::string& path, std::size_t number) {

@@ -24,8 +24,6 @@ constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 constexpr std::array<const char*, 4> quaternion_names{"qw", "qx", "qy", "qz"};
 constexpr std::array<const char*, 4> reflector_names{"a", "b", "c", "d"};
 
-// A reading that was written with few digits may lie beyond a limit by that rounding, not more.
-constexpr double limit_tolerance_rad = 1e-9;
 // Below 7 every reading could be radians: two turns and a bit.
 constexpr double suspicious_below = 7;
 constexpr std::size_t suspicious_rows = 3;

@@ -15,6 +15,9 @@
 
 namespace flexcomp::host {
 
+/// A reading that was written with few digits may lie beyond a joint limit by that rounding, not more.
+constexpr double limit_tolerance_rad = 1e-9;
+
 struct LoadOptions {
   bool force =
       false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong

@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "files/input_error.hpp"
+#include "files/text.hpp"
 
 namespace flexcomp::host {
 
@@ -43,13 +44,6 @@ const std::vector<Named>& times() {
   return all;
 }
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
-
 std::optional<Unit> find(const std::vector<Named>& units, std::string_view word) {
   const std::string wanted = lower(word);
   for (const Named& u : units) {
@@ -78,12 +72,6 @@ bool is_foreign_unit(std::string_view word) {
 
 bool is_unit(std::string_view word) {
   return length_unit_of(word) || angle_unit_of(word) || time_unit_of(word) || is_foreign_unit(word);
-}
-
-std::string_view trimmed(std::string_view s) {
-  const auto first = s.find_first_not_of(" \t");
-  return first == std::string_view::npos ? std::string_view()
-                                         : s.substr(first, s.find_last_not_of(" \t") - first + 1);
 }
 
 std::string letters_and_digits(std::string_view text) {

@@ -9,6 +9,7 @@
 
 #include "files/input_error.hpp"
 #include "files/read_file.hpp"
+#include "files/text.hpp"
 
 namespace flexcomp::host {
 
@@ -16,12 +17,6 @@ namespace {
 
 constexpr std::array<char, 4> delimiters{'\t', ';', ',', ' '};
 constexpr std::size_t least_numbers = 3;
-
-std::string_view trimmed(std::string_view s) {
-  const auto first = s.find_first_not_of(" \t");
-  return first == std::string_view::npos ? std::string_view()
-                                         : s.substr(first, s.find_last_not_of(" \t") - first + 1);
-}
 
 struct Line {
   std::size_t number = 0;
@@ -145,13 +140,11 @@ void drop_empty_end(std::vector<std::string>& cells, std::size_t columns) {
 }
 
 bool is_remark(std::string_view line) {
-  std::string lower(line);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (lower.find("unit") != std::string::npos) return true;
-  const auto colon = lower.find(':');
-  return colon != std::string::npos && colon + 1 < lower.size() && lower[colon + 1] != ':' &&
-         std::isalpha(static_cast<unsigned char>(lower.front())) != 0;
+  const std::string text = lower(line);
+  if (text.find("unit") != std::string::npos) return true;
+  const auto colon = text.find(':');
+  return colon != std::string::npos && colon + 1 < text.size() && text[colon + 1] != ':' &&
+         std::isalpha(static_cast<unsigned char>(text.front())) != 0;
 }
 
 InputError wrong_cells(const std::string& path, const Line& line, const Dialect& dialect, std::size_t wanted,

@@ -78,9 +78,9 @@ bool has_position(const std::vector<std::string>& cells) {
 
 bool is_name(const std::string& role) { return role == "name" || role == "group" || role == "collection"; }
 
-class Reader {
+class PointReader {
  public:
-  Reader(const std::string& path, const PointListOptions& options) : options_(options) {
+  PointReader(const std::string& path, const PointListOptions& options) : options_(options) {
     const std::vector<std::string>& given = options.columns;
     table_ = read_delimited(path, options.dialect, [&given](const std::vector<std::string>& cells) {
       if (given.empty()) return has_position(cells);
@@ -409,7 +409,7 @@ PointList read_point_list(const std::string& path, const PointListOptions& optio
                                   : fmt::format("a known name (did you mean '{}'?)", near),
                      "'" + column + "'");
   }
-  return Reader(path, options).read();
+  return PointReader(path, options).read();
 }
 
 }  // namespace flexcomp::host

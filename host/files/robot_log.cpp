@@ -10,13 +10,12 @@
 #include "files/declared_unit.hpp"
 #include "files/input_error.hpp"
 #include "files/nearest.hpp"
+#include "files/text.hpp"
 #include "files/yaml_field.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-constexpr double limit_tolerance_rad = 1e-9;  // as in data files: rounding of a log with few digits
 
 const std::vector<std::string> name_stems{"name", "point",  "pointname", "pose", "posename",
                                           "id",   "target", "nr",        "no"};
@@ -108,12 +107,9 @@ void require_unit_of(const DelimitedText& table, const std::string& key, const s
     const auto b = unit_of(wanted);
     return a && b && a->name == b->name;
   };
-  std::string lower = found;
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const bool celsius = key == "temp_c" && one_of({"c", "°c", "degc", "deg c", "celsius"}, lower);
-  if (celsius || lower == wanted || (!wanted.empty() && (same(length_unit_of) || same(angle_unit_of))))
-    return;
+  const std::string unit = lower(found);
+  const bool celsius = key == "temp_c" && one_of({"c", "°c", "degc", "deg c", "celsius"}, unit);
+  if (celsius || unit == wanted || (!wanted.empty() && (same(length_unit_of) || same(angle_unit_of)))) return;
   throw InputError(
       table.path, table.header->line, column,
       key == "temp_c" ? std::string("degrees Celsius, as temp_c") : fmt::format("the unit of {}", key),

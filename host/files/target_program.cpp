@@ -17,20 +17,12 @@
 #include "files/point_list.hpp"
 #include "files/quaternion.hpp"
 #include "files/read_file.hpp"
+#include "files/text.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-using Span = ProgramTarget::Span;
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$'; }
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
@@ -55,12 +47,12 @@ class Source {
     return 1 + static_cast<std::size_t>(std::lower_bound(line_ends_.begin(), line_ends_.end(), at) -
                                         line_ends_.begin());
   }
-  std::string_view view(const Span& s) const { return text_.substr(s.begin, s.end - s.begin); }
+  std::string_view view(const TextSpan& s) const { return text_.substr(s.begin, s.end - s.begin); }
   InputError error(std::size_t at, const std::string& field, const std::string& expected,
                    const std::string& found) const {
     return {program_.path, line(at), field, expected, found};
   }
-  double number(const Span& s, const Unit& unit, const std::string& field) const {
+  double number(const TextSpan& s, const Unit& unit, const std::string& field) const {
     if (const auto value = parse_si(view(s), unit)) return *value;
     throw error(s.begin, field, "a finite number", fmt::format("'{}'", shortened(view(s))));
   }
@@ -81,12 +73,12 @@ class Source {
     warn_of_several("tools", names, "All targets are corrected for the one tool of the robot file.");
   }
   /// Without blanks, in small letters: what two spellings of a name have in common.
-  std::string plain(const Span& s) const {
+  std::string plain(const TextSpan& s) const {
     std::string out = lower(view(s));
     out.erase(std::remove_if(out.begin(), out.end(), is_blank), out.end());
     return out;
   }
-  Span trimmed(Span s) const {
+  TextSpan trimmed(TextSpan s) const {
     while (s.begin < s.end && is_blank(text_[s.begin])) ++s.begin;
     while (s.end > s.begin && is_blank(text_[s.end - 1])) --s.end;
     return s;
@@ -123,7 +115,7 @@ class Krl : public Source {
   }
 
  private:
-  using Parts = std::map<std::string, Span>;
+  using Parts = std::map<std::string, TextSpan>;
 
   /// What stands in a line before an aggregate, outside of all braces.
   struct Statement {
@@ -225,7 +217,7 @@ class Krl : public Source {
     int brackets = 0;
     std::size_t start = begin + 1;
     const auto part = [&](std::size_t end) {
-      const Span all = trimmed({start, end});
+      const TextSpan all = trimmed({start, end});
       const std::size_t word = end_of_word(all.begin);
       const std::string name = lower(text_.substr(all.begin, word - all.begin));
       const bool first = parts.emplace(name, trimmed({word, all.end})).second;
@@ -262,14 +254,14 @@ class Krl : public Source {
   }
 
   /// XP1:{…} or {…}:XP1
-  bool is_operand(const Span& all) const {
+  bool is_operand(const TextSpan& all) const {
     std::size_t before = all.begin;
     while (before > 0 && (text_[before - 1] == ' ' || text_[before - 1] == '\t')) --before;
     const std::size_t behind = std::min(text_.find_first_not_of(" \t", all.end), text_.size() - 1);
     return (before > 0 && text_[before - 1] == ':') || text_[behind] == ':';
   }
 
-  void take(const Span& all, bool nested, const std::string& type, const Parts& parts) {
+  void take(const TextSpan& all, bool nested, const std::string& type, const Parts& parts) {
     static const std::array<const char*, joint_count> axes{"a1", "a2", "a3", "a4", "a5", "a6"};
     static const std::array<const char*, 6> pose{"x", "y", "z", "a", "b", "c"};
     const auto count = [&parts](const auto& names) {
@@ -345,7 +337,7 @@ class Krl : public Source {
   }
 
   /// A number, or 'B110' in binary, or '…H' in hexadecimal digits: 'H3F'.
-  unsigned turn(const Span& s) const {
+  unsigned turn(const TextSpan& s) const {
     constexpr unsigned largest = 4095;  // six joints and six external axes
     const std::string word(view(s));
     if (word.size() > 3 && word.front() == '\'' && word.back() == '\'') {
@@ -419,7 +411,7 @@ class Rapid : public Source {
  private:
   /// [ … ], or what stands between two commas; a list inside of an expression is among its items.
   struct Node {
-    Span span;
+    TextSpan span;
     bool list = false;
     std::vector<Node> items;
   };
@@ -434,7 +426,7 @@ class Rapid : public Source {
     bool assigns = false;
     bool option = false;  ///< behind a backslash
     std::string move;     ///< MoveL …, small letters
-    std::vector<Span> arguments;
+    std::vector<TextSpan> arguments;
     bool argument_begins = false;
 
     void see(std::size_t at) {
@@ -609,7 +601,7 @@ class Rapid : public Source {
   void end_of_statement(std::size_t at) {
     if (!now_.move.empty()) {
       std::vector<std::string> given;
-      for (const Span& a : now_.arguments) {
+      for (const TextSpan& a : now_.arguments) {
         if (text_[a.begin] != '\\') given.push_back(name_at(a.begin, at));
       }
       // MoveL point, speed, zone, tool …; MoveC has two points; elsewhere the tool is the last.
@@ -695,7 +687,7 @@ class Rapid : public Source {
       }
     }
     const auto spans = [](const Node& n, std::size_t count) {
-      std::vector<Span> out;
+      std::vector<TextSpan> out;
       for (std::size_t k = 0; k < count; ++k) out.push_back(n.items[k].span);
       return out;
     };
@@ -712,7 +704,7 @@ class Rapid : public Source {
       for (std::size_t k = 0; k < 3; ++k)
         found.position_m[static_cast<Eigen::Index>(k)] = number(found.numbers[k], unit::mm, "trans");
       std::array<double, 4> q{};
-      const std::vector<Span> rotation = spans(l[1], 4);
+      const std::vector<TextSpan> rotation = spans(l[1], 4);
       for (std::size_t k = 0; k < 4; ++k) q[k] = number(rotation[k], unit::si, "rot");
       const auto unit = unit_quaternion(q);
       if (!unit) {
@@ -729,7 +721,7 @@ class Rapid : public Source {
     program_.targets.push_back(std::move(found));
   }
 
-  int whole(const Span& s) const {
+  int whole(const TextSpan& s) const {
     constexpr int most = 8;  // quarter turns: two full ones
     const double value = number(s, unit::si, "robconf");
     if (std::abs(value) > most || value != std::floor(value))
@@ -770,7 +762,7 @@ class Val3 : public Source {
         type.clear();
         name.clear();
       }
-      const std::map<std::string, Span> a = attributes(at, end);
+      const std::map<std::string, TextSpan> a = attributes(at, end);
       if (const auto n = a.find("name"); n != a.end()) name = std::string(view(n->second));
       if (tag == "Data") {
         const auto t = a.find("type");
@@ -830,7 +822,7 @@ class Val3 : public Source {
     throw error(at, "", "a tag that ends with >", "none");
   }
 
-  void target(std::size_t at, const std::string& name, const std::map<std::string, Span>& a) {
+  void target(std::size_t at, const std::string& name, const std::map<std::string, TextSpan>& a) {
     ProgramTarget found;
     found.line = line(at);
     found.name = name;
@@ -842,8 +834,8 @@ class Val3 : public Source {
     program_.targets.push_back(std::move(found));
   }
 
-  std::map<std::string, Span> attributes(std::size_t at, std::size_t end) const {
-    std::map<std::string, Span> out;
+  std::map<std::string, TextSpan> attributes(std::size_t at, std::size_t end) const {
+    std::map<std::string, TextSpan> out;
     std::size_t k = at + 1;
     while (k < end && !is_blank(text_[k])) ++k;
     while (k < end) {
@@ -855,7 +847,7 @@ class Val3 : public Source {
       if (k >= end) break;
       const std::size_t close = text_.find(text_[k], k + 1);
       if (close >= end) break;
-      if (!out.emplace(name, Span{k + 1, close}).second)
+      if (!out.emplace(name, TextSpan{k + 1, close}).second)
         throw error(start, name, "each attribute once", "two");
       k = close + 1;
     }
@@ -928,7 +920,7 @@ TargetProgram read_program(const std::string& path, ProgramLanguage language) {
 
 std::string program_text(const TargetProgram& program, const std::vector<ProgramTarget>& corrected) {
   std::map<std::size_t, std::pair<std::size_t, std::string>> edits;
-  const auto put = [&edits](const Span& span, const std::string& text) {
+  const auto put = [&edits](const TextSpan& span, const std::string& text) {
     edits[span.begin] = {span.end, text};
   };
   for (std::size_t n = 0; n < corrected.size(); ++n) {

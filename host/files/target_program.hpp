@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "files/robot_file.hpp"
+#include "files/text.hpp"
 
 namespace flexcomp::host {
 
@@ -35,13 +36,9 @@ struct ProgramTarget {
 
   std::optional<int> cfx;  ///< ABB's, where it is 0 … 7
 
-  struct Span {
-    std::size_t begin = 0;
-    std::size_t end = 0;
-  };
-  std::vector<Span> numbers;        ///< joints, or position and orientation, where they stand in the text
-  std::optional<Span> turn_number;  ///< where `turn` stands
-  std::vector<Span> quadrant_numbers;
+  std::vector<TextSpan> numbers;        ///< joints, or position and orientation, where they stand in the text
+  std::optional<TextSpan> turn_number;  ///< where `turn` stands
+  std::vector<TextSpan> quadrant_numbers;
 };
 
 struct TargetProgram {

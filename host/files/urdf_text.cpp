@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "files/text.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -67,13 +69,8 @@ std::vector<Tag> tags_of(std::string_view text) {
   return tags;
 }
 
-struct Span {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
-
 /// The value of an attribute within a tag, without its quotes.
-std::optional<Span> attribute(std::string_view text, const Tag& tag, std::string_view name) {
+std::optional<TextSpan> attribute(std::string_view text, const Tag& tag, std::string_view name) {
   std::size_t at = tag.begin + 1 + tag.name.size();
   while (at < tag.end) {
     while (at < tag.end && std::string_view(" \t\r\n").find(text[at]) != std::string_view::npos) ++at;
@@ -85,7 +82,7 @@ std::optional<Span> attribute(std::string_view text, const Tag& tag, std::string
     if (at >= tag.end) return {};
     const std::size_t end = text.find(text[at], at + 1);
     if (end >= tag.end) return {};
-    if (found == name) return Span{at + 1, end};
+    if (found == name) return TextSpan{at + 1, end};
     at = end + 1;
   }
   return {};
@@ -170,7 +167,7 @@ std::string with_origins(const std::string& text, const std::map<std::string, Po
     const auto rpy = attribute(text, *origin, "rpy");
     const std::size_t behind_name = origin->begin + 1 + origin->name.size();
     std::string missing;
-    const auto put = [&](const std::optional<Span>& span, const char* attribute_name,
+    const auto put = [&](const std::optional<TextSpan>& span, const char* attribute_name,
                          const std::string& value) {
       if (span) {
         edits[span->begin] = {span->end, value};

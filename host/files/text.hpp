@@ -1,0 +1,26 @@
+/// \file
+/// What readers of text do to a piece of it.
+#ifndef FLEXCOMP_HOST_FILES_TEXT_HPP
+#define FLEXCOMP_HOST_FILES_TEXT_HPP
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace flexcomp::host {
+
+/// Bytes of a text, from `begin` to before `end`.
+struct TextSpan {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Without blanks and tabs at both ends.
+std::string_view trimmed(std::string_view text);
+
+/// ASCII letters in lower case; other bytes as they are.
+std::string lower(std::string_view text);
+
+}  // namespace flexcomp::host
+
+#endif
