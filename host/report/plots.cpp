@@ -585,7 +585,7 @@ std::string plot_against(const std::vector<PagePose>& poses, const std::vector<d
       if (poses[n].outlier) apart += diamond(places.back()[0], places.back()[1]);
     }
     std::string d;
-    if (places.size() > 200) {
+    if (places.size() > 200 || places.size() < poses.size()) {
       d = fine_dots(std::move(places));
     } else {
       for (const auto& [at, value] : places) d += dot(at, value);

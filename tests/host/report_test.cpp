@@ -275,7 +275,7 @@ TEST(Report, ShowsTheNumbersThatWerePutIn) {
               HasSubstr("<span class=\"before\">5.00 mm</span> → <span class=\"after\">0.0500 mm</span>"));
   EXPECT_THAT(text, HasSubstr("100.0 ×"));
   EXPECT_THAT(text, Not(HasSubstr("mean [deg]"))) << "no orientation is known";
-  EXPECT_THAT(text, HasSubstr("<td>-0.08012</td><td>0.00034</td><td>deg</td><td>236</td><td></td>"));
+  EXPECT_THAT(text, HasSubstr("<td>-0.08012</td><td>0.00034</td><td>deg</td><td>236</td></tr>"));
   EXPECT_THAT(
       text,
       HasSubstr(
@@ -794,7 +794,7 @@ TEST(Report, CurvesAndBarsAreDrawnInsideTheFrame) {
   // Steps hold their value until the next: no slanting line.
   const std::string steps =
       plot_curves({"Steps", "x", "y", {}, false, {{"", {{0, 1}, {1, 2}, {3, 5}}, CurveStyle::steps}}});
-  const std::size_t line = steps.find("class=\"line after\" d=\"");
+  const std::size_t line = steps.find("class=\"line c1\" d=\"");
   ASSERT_NE(line, std::string::npos);
   EXPECT_EQ(occurrences(steps.substr(line, steps.find("/>", line) - line), "L"), 0U);
 }
