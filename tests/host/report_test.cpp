@@ -742,6 +742,24 @@ TEST(Report, OneStepIsNoCourse) {
   EXPECT_EQ(occurrences(html(page_of(d, {}, robot, "data.csv", std::nullopt), false), "<svg"), 2U);
 }
 
+TEST(Report, TheModelsSayWhatTheyWereFittedWithout) {
+  const RobotFile robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
+  const std::string words = "fitted anew to these rows, without the --fix and --tolerances of this run.";
+  const Identification r;
+  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, true), false), HasSubstr(words));
+  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, false), false), Not(HasSubstr("--fix")));
+}
+
+TEST(Report, DotsShrinkWithTheirNumber) {
+  for (const auto& [count, kind] : std::vector<std::pair<std::size_t, std::string>>{
+           {60, "dots"}, {61, "mid"}, {200, "mid"}, {300, "mid"}, {301, "fine"}}) {
+    const std::string svg =
+        plot_against(example(count).poses[0].poses, std::vector<double>(count, 1), "q1 [deg]", "joint 1");
+    for (const char* axis : {"x", "y", "z"})
+      EXPECT_EQ(occurrences(svg, "class=\"" + kind + " " + axis + "\""), 1U) << count;
+  }
+}
+
 TEST(Report, APlanIsDrawnToTheEndOfItsSearch) {
   Page page;
   page.title = "Plan";

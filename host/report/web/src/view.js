@@ -63,7 +63,9 @@ export class ArmView {
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');  // its keys are its own
     canvas.setAttribute('aria-roledescription', 'picture that can be turned');
-    this.stage = element('div', {class: 'stage'}, canvas);
+    // Printed instead: what WebGL draws after a page was told that it is printed does not reach the paper.
+    this.copy = element('canvas', {class: 'copy', 'aria-hidden': 'true'});
+    this.stage = element('div', {class: 'stage'}, canvas, this.copy);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener('change', () => this.render());
     // A finger that moves up or down scrolls the page; a wheel does until the view was clicked.
@@ -91,6 +93,7 @@ export class ArmView {
       this.colours = colours();
       this.build();
       this.renderNow();
+      if (onPaper()) this.copyPicture();
     });
     this.resize();
   }
@@ -578,6 +581,13 @@ export class ArmView {
     this.camera.updateProjectionMatrix();
     if (first) this.lookFrom(this.from);
     this.renderNow();
+  }
+
+  copyPicture() {
+    const {domElement: from} = this.renderer;
+    this.copy.width = from.width;
+    this.copy.height = from.height;
+    this.copy.getContext('2d').drawImage(from, 0, 0);
   }
 
   render() {
