@@ -116,7 +116,7 @@ using Cells = std::vector<std::string>;
 
 bool is_number(const std::string& cell) {
   return cell.empty() || cell.starts_with("–") ||
-         std::string_view("0123456789+-.<").find(cell[0]) != std::string_view::npos;
+         std::string_view("0123456789+-.<>").find(cell[0]) != std::string_view::npos;
 }
 
 /// A table whose first column names its rows. Numbers stand on the right of their column, words on the left, and these
@@ -136,7 +136,8 @@ std::string table(const Cells& columns, const std::vector<Cells>& rows, const ch
   for (const Cells& row : rows) {
     out += "<tr>";
     for (std::size_t k = 0; k < row.size(); ++k) {
-      out += k == 0 ? fmt::format("<th scope=\"row\">{}</th>", escaped(row[k]))
+      out += k == 0 ? fmt::format("<th scope=\"row\"{}>{}</th>", row[k].size() > 40 ? " class=\"long\"" : "",
+                                  escaped(row[k]))
                     : fmt::format("<td{}>{}</td>", k < form.size() ? form[k] : "", escaped(row[k]));
     }
     out += "</tr>\n";

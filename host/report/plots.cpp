@@ -101,7 +101,7 @@ std::string log_text(int factor, int exponent) {
 std::vector<Tick> Scale::ticks(int about) const {
   std::vector<Tick> found;
   if (log) {
-    const bool few = high / low < 1000;  // 2 and 5 are named where there is room
+    const bool few = high / low < 1e5;  // 2 and 5 are named where there is room
     const auto end = [&](double v) {
       return v < low * 1.001 || v > high * 0.999;  // the ends always, where they are round
     };

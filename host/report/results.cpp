@@ -102,9 +102,14 @@ void add_other_before(Page& page, const Before& before, bool frames_fitted) {
   }
 }
 
+/// To the micrometre, and never a nought for what is none.
+std::string mm_text(double metres) {
+  return metres > 0 && metres < 5e-7 ? std::string("< 0.001") : fmt::format("{:.3f}", metres * 1e3);
+}
+
 std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) {
-  return fmt::format("Mean position error {:.3f} mm before, {:.3f} mm after.", before.mean_m * 1e3,
-                     after.mean_m * 1e3);
+  return fmt::format("Mean position error {} mm before, {} mm after.", mm_text(before.mean_m),
+                     mm_text(after.mean_m));
 }
 
 }  // namespace
@@ -168,7 +173,8 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
              {"poses", fmt::format("{}", rows.size())},
              {"parameters identifiable", fmt::format("{} of {}", r.identifiable, r.parameters)},
              {"numbers of the frames", fmt::format("{}", r.frame_parameters)},
-             {"chi-square per degree of freedom", fmt::format("{:.3g}", r.fit.chi2_per_dof())},
+             {"chi-square per degree of freedom",
+              r.fit.degrees_of_freedom > 0 ? fmt::format("{:.3g}", r.fit.chi2_per_dof()) : "–"},
              {"condition", fmt::format("{:.3g}", r.condition)},
              {"O1", fmt::format("{:.3g}", r.o1)},
              {"converged", r.fit.converged ? "yes" : "no"},

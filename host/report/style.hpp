@@ -39,7 +39,7 @@ th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--s
   white-space: normal; vertical-align: bottom; }
 tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
 .text { text-align: left; } td.text { white-space: normal; } td.long { min-width: 15rem; }
-.parameters { font-size: .9rem; } .parameters :is(td, th):nth-child(4) { text-align: left; }
+.parameters { font-size: .9rem; } .parameters :is(td, th):is(:nth-child(4), :nth-child(6)) { text-align: left; }
 .scroll { overflow-x: auto; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, 100%), 1fr)); gap: .6rem 1.2rem; }
 .plots.wide { grid-template-columns: repeat(auto-fit, minmax(min(400px, 100%), 1fr)); }
@@ -75,7 +75,7 @@ footer { color: var(--soft); font-size: .85rem; margin: 2.5rem 0 1rem; border-to
   .plots, .plots.wide { grid-template-columns: 1fr 1fr; }
   figure, tr, .doubts, .facts div, .summary, .headline { break-inside: avoid; } h2, h3, .headline { break-after: avoid; }
   .scroll { overflow: visible; } td.long { min-width: 0; } th, td { padding-right: .6rem; }
-  td.text, th:first-child { white-space: normal; overflow-wrap: anywhere; }
+  td.text, th:first-child { white-space: normal; overflow-wrap: break-word; } .long { overflow-wrap: anywhere !important; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
 )css";

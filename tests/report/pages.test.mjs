@@ -390,6 +390,12 @@ test('by keyboard and to those who listen', async () => {
   assert.match(await page.getAttribute('.scatter', 'aria-label'), /position error \[mm\] against q1 \[deg\], 60 poses: before .* mm, after /);
   assert.equal(await rings('chosen'), 2, 'the pose in which the arm stands');
   assert.equal(await rings('found'), 0);
+  // The ring is where the dot is: on the axis, which reaches 3 % further than the values on both sides.
+  const {q1_deg: q1} = csv('fitted.csv');
+  const [low, high] = [Math.min(...q1), Math.max(...q1)];
+  const wide = await page.locator('.scatter .u-over').evaluate((e) => e.clientWidth);
+  const ringed = await page.locator('.scatter .ring.chosen').first().evaluate((e) => parseFloat(e.style.left));
+  assert.ok(Math.abs(ringed / wide - ((q1[0] - low) / (high - low) + 0.03) / 1.06) < 0.01, `${ringed} of ${wide}`);
   await page.focus('.scatter');
   const values = [];
   for (let k = 0; k < 4; ++k) {
@@ -454,6 +460,27 @@ test('rows that lie apart are marked, and errors that cannot be seen are spoken 
   }
 });
 
+test('a study: a wide remark wraps, on paper too', async () => {
+  flexcomp('study', 'fig3', '--arm', 'tx60l', '--quiet', '--report', 'study.html');
+  for (const [width, media] of [[320, 'screen'], [700, 'print']]) {
+    const {page, troubles, close} = await open(browser, at('study.html'), {width});
+    await page.emulateMedia({media});
+    const size = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+    assert.ok(size[0] <= size[1], `${media}: ${size}`);
+    // Words of the other columns stay whole.
+    const lines = await page.locator('tbody th').evaluateAll((cells) =>
+      cells.map((e) => { const r = document.createRange(); r.selectNodeContents(e); return r.getClientRects().length; }));
+    assert.ok(lines.length === 4 && lines.every((n) => n === 1), `${media}: ${lines}`);
+    assert.deepEqual(await page.locator('thead th').allTextContents(), ['arm', 'model', 'parameters', 'paper', 'ours', 'remark']);
+    if (media === 'print') {
+      const out = await page.locator('td').evaluateAll((cells) => cells.filter((e) => e.getBoundingClientRect().right > innerWidth).length);
+      assert.equal(out, 0);
+    }
+    assert.deepEqual(troubles, []);
+    await close();
+  }
+});
+
 test('the plan has beams, bodies and all its poses', async () => {
   const {page, troubles, close} = await open(browser, at(pages.plan));
   const whole = await picture(page);
@@ -511,7 +538,7 @@ test('on paper: drawings for plots, no buttons, light in a dark room too', async
 /** Pictures of a PDF, as they were compressed: that of the arm is the largest. */
 function imagesOf(pdf) {
   const text = pdf.toString('latin1');
-  return [...text.matchAll(/<<[^]{0,400}?\/Subtype ?\/Image[^]{0,400}?>> ?\r?\nstream\r?\n([^]*?)\r?\nendstream/g)].map((m) => m[1])
+  return [...text.matchAll(/\/Subtype ?\/Image\b[^]{0,300}?>> ?stream\r?\n([^]*?)\r?\nendstream/g)].map((m) => m[1])
     .sort((a, b) => b.length - a.length);
 }
 

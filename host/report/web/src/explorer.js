@@ -174,7 +174,6 @@ export class Explorer {
     const c = colours();
     this.scatter = this.drawScatter(c);
     this.histograms = this.drawHistograms(c);
-    this.mark();
   }
 
   drawScatter(c) {
@@ -205,7 +204,11 @@ export class Explorer {
       hooks: {
         setCursor: [(u) => this.point(u)],
         ready: [(u) => u.over.addEventListener('click', () => this.take())],
-        draw: [(u) => { this.drawFloor(u, c, 'y'); this.drawDots(u, c); }],
+        draw: [(u) => {
+          this.drawFloor(u, c, 'y');
+          this.drawDots(u, c);
+          if (u === this.scatter) this.mark();  // only now it is known where the dots are
+        }],
       },
     });
     const range = (which) => `${which} ${this.text(least(this.values[which]))} to ${this.text(most(this.values[which]))}`;
