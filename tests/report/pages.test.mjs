@@ -447,6 +447,11 @@ test('rows that lie apart are marked, and errors that cannot be seen are spoken 
   assert.match(await page.locator('.explore').nth(2).innerText(), /Errors of 0 \(20\) lie on the lower edge/);
   assert.deepEqual(troubles, []);
   await close();
+  // One pose: the base with its axes is in the picture as well as the arm.
+  const one = await open(browser, at('arm.html'), {width: 600});
+  assert.equal((await picture(one.page)).edge, 0);
+  assert.match(await one.page.innerText('main'), /position error over 1 pose\n/);
+  await one.close();
   const even = readFileSync(at(pages.identify), 'utf8');
   writeFileSync(at('apart.html'), even.replace('"outlier":[]', '"outlier":[3,10]'));
   const marked = await open(browser, at('apart.html'));
