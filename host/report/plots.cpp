@@ -137,7 +137,7 @@ std::vector<Tick> ticks_of(const Axis& axis, double length, bool across) {
   };
   if (axis.named.empty() && !axis.scale.log) {
     for (int about = axis.about; about > 1; --about) {
-      const std::vector<Tick> ticks = axis.scale.ticks(about);
+      std::vector<Tick> ticks = axis.scale.ticks(about);
       bool fits = true;
       for (std::size_t k = 1; k < ticks.size(); ++k) fits = fits && apart(ticks[k - 1], ticks[k]);
       if (fits) return ticks;
@@ -153,6 +153,7 @@ std::vector<Tick> ticks_of(const Axis& axis, double length, bool across) {
       return std::abs(power - std::round(power)) < 1e-6 ? 1 : 2;
     };
     std::vector<std::pair<int, Tick>> ranked;
+    ranked.reserve(wanted.size());
     for (const Tick& t : wanted) ranked.emplace_back(rank(t), t);
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -533,7 +534,9 @@ std::string plot_histogram(const ErrorPairs& errors) {
   for (std::size_t k = 0; k < classes; ++k) most = std::max({most, before[k], after[k]});
   const double step = std::max(1.0, round_step(static_cast<double>(most), 4));
   Axis y{{0, step * std::ceil(static_cast<double>(most) / step), false}, "poses"};
-  for (double v = 0; v <= y.scale.high; v += step) y.named.push_back({v, fmt::format("{:.0f}", v)});
+  const auto whole = static_cast<std::size_t>(step);
+  for (std::size_t v = 0; static_cast<double>(v) <= y.scale.high; v += whole)
+    y.named.push_back({static_cast<double>(v), fmt::format("{}", v)});
   Plot plot("How many poses have which error, before and after", x, y);
   const auto bars = [&](const std::vector<std::size_t>& count) {
     std::string d;

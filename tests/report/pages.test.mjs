@@ -426,7 +426,7 @@ test('rows that lie apart are marked, and errors that cannot be seen are spoken 
   const titles = {Worse: 'good.csv,bad.csv', Tiny: 'good.csv,tiny.csv', None: 'good.csv,none.csv'};
   flexcomp('report', '--robot', robot, ...Object.entries(titles).flatMap(([title, files]) => ['--errors', `${title}=${files}`]),
     '-o', 'odd.html');
-  const {page, troubles, close} = await open(browser, at('odd.html'));
+  const {page, troubles, close} = await open(browser, at('odd.html'), {width: 600});
   assert.match(await page.innerText('.doubts'), /Worse: the errors are larger after than before/);
   assert.doesNotMatch(await page.innerText('main'), /0\.00000/);
   // Arrows that grow are inside the picture too.
@@ -454,8 +454,8 @@ test('rows that lie apart are marked, and errors that cannot be seen are spoken 
   await one.close();
   const even = readFileSync(at(pages.identify), 'utf8');
   writeFileSync(at('apart.html'), even.replace('"outlier":[]', '"outlier":[3,10]'));
-  const marked = await open(browser, at('apart.html'));
-  const plain = await open(browser, at(pages.identify));
+  const marked = await open(browser, at('apart.html'), {width: 500});
+  const plain = await open(browser, at(pages.identify), {width: 500});
   assert.ok(await inked(marked.page, '.scatter') > await inked(plain.page, '.scatter') + 80, 'diamonds');
   assert.match(await marked.page.innerText('.legend'), /lies far from the rest/);
   assert.notEqual((await picture(marked.page)).sum, (await picture(plain.page)).sum);
@@ -550,7 +550,7 @@ function imagesOf(pdf) {
 test('from a dark screen onto white paper', async () => {
   // Nothing is told to the page but that it is printed.
   const printed = async (scheme) => {
-    const {page, troubles, close} = await open(browser, at(pages.identify), {width: 794, scheme});
+    const {page, troubles, close} = await open(browser, at(pages.identify), {width: 500, scheme});
     const {sum} = await picture(page);
     const images = imagesOf(await page.pdf({path: at(`from_${scheme}.pdf`), format: 'A4'}));
     await settled(page);
