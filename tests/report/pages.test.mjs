@@ -394,6 +394,11 @@ test('by keyboard and to those who listen', async () => {
   const {q1_deg: q1} = csv('fitted.csv');
   const [low, high] = [Math.min(...q1), Math.max(...q1)];
   const wide = await page.locator('.scatter .u-over').evaluate((e) => e.clientWidth);
+  const against = page.locator('.explore select').nth(1);
+  for (const joint of ['1', '0']) {
+    await against.selectOption(joint);
+    await settled(page);
+  }
   const ringed = await page.locator('.scatter .ring.chosen').first().evaluate((e) => parseFloat(e.style.left));
   assert.ok(Math.abs(ringed / wide - ((q1[0] - low) / (high - low) + 0.03) / 1.06) < 0.01, `${ringed} of ${wide}`);
   await page.focus('.scatter');
@@ -504,6 +509,19 @@ test('the plan has beams, bodies and all its poses', async () => {
   assert.ok(one.near.beam < bare.near.beam && one.near.beam > 50, 'the beams of one pose');
   assert.deepEqual(troubles, []);
   await close();
+  // One folded pose to come, and the arm stretched out wherever it was measured already.
+  const text = readFileSync(at(pages.plan), 'utf8');
+  const [, json] = text.match(/id="data">(.*?)<\/script>/s);
+  const data = JSON.parse(json);
+  const reach = [[0, 0, 0, 0, 0, 0], [0, 90, 0, 0, 0, 0], [120, 90, 0, 0, 0, 0], [-120, 90, 0, 0, 0, 0]];
+  Object.assign(data.plan, {q: [0, 0, 150000, 0, 0, 0], payload: [0], known: reach.flat().map((v) => v * 1000), obstacles: []});
+  delete data.plan.tracker;
+  writeFileSync(at('known.html'), text.replace(json, () => JSON.stringify(data)));
+  const known = await open(browser, at('known.html'), {width: 600});
+  const all = await picture(known.page);
+  assert.ok(all.near.before > 10, JSON.stringify(all));
+  assert.equal(all.edge, 0, 'what was measured already leaves the picture');
+  await known.close();
 });
 
 test('several sets: one is chosen, each has its own plots', async () => {
