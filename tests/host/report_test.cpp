@@ -543,6 +543,7 @@ TEST(Report, OfManyPosesTheWorstAreDrawnAndTheRestIsSaid) {
     const std::vector<std::pair<double, double>> found = dots(svg.substr(at, svg.find("/>", at) - at));
     EXPECT_EQ(found.size(), 1000U);
     std::vector<double> heights;
+    heights.reserve(found.size());
     for (const auto& [x, y] : found) heights.push_back(y);
     std::sort(heights.begin(), heights.end());
     EXPECT_GT(heights[1] - heights[0], 20) << which << ": the one that is far off";
