@@ -251,7 +251,8 @@ void Identify::run() const {
                      {"values", parameters}});
   if (!report.empty()) {
     write_file(report,
-               html(page_of(r, rows, robot_file, data, compare_models(robot_file, rows, data, options))));
+               html(page_of(r, rows, robot_file, data, compare_models(robot_file, rows, data, options),
+                            !options.fixed.empty() || !options.tolerances.empty())));
     common.say(report + ": written");
   }
   if (r.doubts.empty()) return;

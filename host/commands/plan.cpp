@@ -620,6 +620,7 @@ Page Plan::page(const RobotFile& robot_file, const PoseSet& set, const std::vect
   for (const auto& [evaluations, log_fitness] : search.history()) {
     plan.progress.emplace_back(static_cast<double>(evaluations), std::exp(log_fitness));
   }
+  plan.evaluations = static_cast<double>(search.evaluations());
   for (const PlannedPose& p : set) {
     plan.q_rad.push_back(p.q_rad);
     if (payload_column_) plan.payload_kg.push_back(problem_.payloads[p.payload].payload_kg);

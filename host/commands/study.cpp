@@ -115,7 +115,13 @@ Page page_of(const Study& study) {
   page.title = study.title;
   page.summary =
       "The paper's figures, ours, and what no unbiased estimator can better: " + study.quantity + ".";
-  const Table table = table_of(study);
+  Table table = table_of(study);
+  table.columns.back() = "remark";
+  if (std::all_of(study.rows.begin(), study.rows.end(),
+                  [](const StudyRow& row) { return row.remark.empty(); })) {
+    table.columns.pop_back();
+    for (auto& row : table.rows) row.pop_back();
+  }
   PageSection section;
   section.title = "Result";
   section.columns = table.columns;

@@ -32,7 +32,7 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
   Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]", {}, false, {}};
   if (d.noise_floor_m > 0) curves.floor = d.noise_floor_m * 1e3;
   if (!d.steps.empty())
-    section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "on left-out poses"};
+    section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "chi-square, left-out poses"};
   Curve fitted{"fitted rows", {}, CurveStyle::joined, "before", {}};
   for (std::size_t k = 0; k < d.steps.size(); ++k) {
     const DiagnosisStep& s = d.steps[k];
@@ -40,26 +40,31 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
     section.rows.push_back({fmt::format("{}", k), s.what, mm(s.train_rms_m),
                             fmt::format("{:.3g}", s.chi2_per_dof), fmt::format("{:.3g}", s.cross_validated)});
   }
-  if (fitted.points.size() < 2)
+  if (fitted.points.empty())
     fitted.points = {{0, d.error_before.rms_m * 1e3}, {1, d.error_after.rms_m * 1e3}};
   const double last = fitted.points.back()[0];
   for (std::size_t k = 0; k < fitted.points.size(); ++k) curves.x_texts.push_back(fmt::format("{}", k));
   curves.curves.push_back(fitted);
-  if (others) {
+  if (others && last > 0) {
     curves.curves.push_back({"held-out rows, first and last",
                              {{0, others->before.rms_m * 1e3}, {last, others->after.rms_m * 1e3}},
                              CurveStyle::dots,
                              "after",
                              {}});
+  }
+  if (others) {
     section.paragraphs.push_back(fmt::format(
         "On {} rows that were not fitted: {} mm before, {} mm after; the gap {} mm before, {} mm after.",
         others->rows, mm(others->before.rms_m), mm(others->after.rms_m),
         mm(gap_of(others->before.rms_m, others->noise_floor_m)),
         mm(gap_of(others->after.rms_m, others->noise_floor_m))));
   }
-  const std::string caption =
-      "Root mean square of the 3-D position error at the start and after each step below.";
-  section.figures.emplace_back(plot_curves(curves), caption);
+  // One dot has no course.
+  if (last > 0)
+    section.figures.emplace_back(
+        plot_curves(curves), d.steps.empty() ? "Root mean square of the 3-D position error before and after."
+                                             : "Root mean square of the 3-D position error at the start and "
+                                               "after each step of the table.");
   return section;
 }
 
@@ -85,13 +90,17 @@ PageSection place(const Diagnosis& d) {
     bars.before.push_back(gap_mm * std::sqrt(std::max(0.0, p.explains)));
     const auto left = std::find_if(d.places_left.begin(), d.places_left.end(),
                                    [&](const PlaceShare& l) { return l.place == p.place; });
-    if (d.places_left.empty()) continue;
+    // Nothing found, nothing changed.
+    if (d.places_left.empty() || d.error_after.rms_m == d.error_before.rms_m) continue;
     bars.after.push_back(left == d.places_left.end() ? 0
                                                      : left_mm * std::sqrt(std::max(0.0, left->explains)));
   }
-  if (!bars.names.empty())
-    section.figures.emplace_back(plot_bars(bars),
-                                 "Orange: the model at the start. Blue: with what was found.");
+  if (std::string drawing = plot_bars(bars); !drawing.empty()) {
+    section.figures.emplace_back(std::move(drawing),
+                                 bars.after.empty()
+                                     ? "The model at the start."
+                                     : "Orange: the model at the start. Blue: with what was found.");
+  }
   return section;
 }
 
@@ -261,7 +270,7 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
     p.sections.push_back(open_section(d));
   if (!d.telling_poses.empty()) p.sections.push_back(telling_section(d));
   if (d.residuals_before.size() == rows.size() && d.residuals_after.size() == rows.size()) {
-    PagePoses set = page_poses(d.residuals_before, d.residuals_after, rows, d.outliers);
+    PagePoses set = page_poses(d.residuals_before, d.residuals_after, rows, d.outliers, false);
     set.title = "Poses that were fitted";
     set.before = "the model at the start";
     set.after = "with what was found";

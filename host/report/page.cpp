@@ -41,16 +41,46 @@ Numbers numbers_of(std::vector<double> values) {
   return n;
 }
 
-/// Three significant digits and no more than five decimals.
+/// Three significant digits and no more than five decimals; never a nought for what is none.
 std::string shown(double v) {
   if (v == 0) return "0";
+  if (std::abs(v) < 5e-6) return "< 0.00001";
   const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(std::abs(v)))), 0, 5);
   return fmt::format("{:.{}f}", v, decimals);
+}
+
+/// With the unit in which it can be read.
+std::string length_text(double mm) {
+  if (mm == 0 || mm >= 1e-3) return shown(mm) + " mm";
+  if (mm >= 1e-6) return shown(mm * 1e3) + " µm";
+  if (mm >= 1e-9) return shown(mm * 1e6) + " nm";
+  return "< 0.001 nm";
+}
+
+/// \param exact  what is left has no meaning
+std::string change_text(double before, double after, bool exact = false) {
+  if (exact || !(before > 0) || !(after > 0)) return "–";
+  const double ratio = before / after;
+  const bool smaller = ratio >= 1;
+  const double times = smaller ? ratio : 1 / ratio;
+  const std::string text = times > 1000 ? "> 1000" : fmt::format("{:.1f}", times);
+  if (text == "1.0") return "the same";
+  return fmt::format("{} × {}", text, smaller ? "smaller" : "larger");
+}
+
+std::vector<std::size_t> outliers(const PagePoses& set) {
+  std::vector<std::size_t> rows;
+  for (std::size_t k = 0; k < set.poses.size(); ++k) {
+    if (set.poses[k].outlier) rows.push_back(k);
+  }
+  return rows;
 }
 
 ErrorPairs positions(const PagePoses& set) {
   ErrorPairs e;
   e.unit = "mm";
+  e.quantity = "position error";
+  e.outliers = outliers(set);
   if (set.noise_floor_m) e.floor = *set.noise_floor_m * 1e3;
   for (const PagePose& p : set.poses) {
     e.before.push_back(length(p.before_m) * 1e3);
@@ -63,6 +93,7 @@ ErrorPairs positions(const PagePoses& set) {
 ErrorPairs orientations(const PagePoses& set) {
   ErrorPairs e;
   e.unit = "deg";
+  e.quantity = "orientation error";
   for (const PagePose& p : set.poses) {
     if (!p.before_rad || !p.after_rad) return {};
     e.before.push_back(degrees(*p.before_rad));
@@ -72,6 +103,7 @@ ErrorPairs orientations(const PagePoses& set) {
 }
 
 std::string figure(const std::string& svg, const std::string& caption) {
+  if (svg.empty()) return "";  // nothing to draw
   return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", svg, caption);
 }
 
@@ -82,16 +114,31 @@ std::string still(const std::string& drawing) {
 
 using Cells = std::vector<std::string>;
 
-/// A table whose first column names its rows.
+bool is_number(const std::string& cell) {
+  return cell.empty() || cell.starts_with("–") ||
+         std::string_view("0123456789+-.<>").find(cell[0]) != std::string_view::npos;
+}
+
+/// A table whose first column names its rows. Numbers stand on the right of their column, words on the left, and these
+/// may take several lines.
 std::string table(const Cells& columns, const std::vector<Cells>& rows, const char* kind = "") {
+  std::vector<const char*> form(columns.size(), "");
+  for (const Cells& row : rows) {
+    for (std::size_t k = 1; k < std::min(row.size(), form.size()); ++k) {
+      if (!is_number(row[k]) && *form[k] == 0) form[k] = " class=\"text\"";
+      if (row[k].size() > 40) form[k] = " class=\"text long\"";
+    }
+  }
   std::string out = fmt::format("<div class=\"scroll\"><table{}><thead><tr>", kind);
-  for (const std::string& name : columns) out += fmt::format("<th scope=\"col\">{}</th>", escaped(name));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    out += fmt::format("<th scope=\"col\"{}>{}</th>", form[k], escaped(columns[k]));
   out += "</tr></thead><tbody>\n";
   for (const Cells& row : rows) {
     out += "<tr>";
     for (std::size_t k = 0; k < row.size(); ++k) {
-      out += k == 0 ? fmt::format("<th scope=\"row\">{}</th>", escaped(row[k]))
-                    : fmt::format("<td>{}</td>", escaped(row[k]));
+      out += k == 0 ? fmt::format("<th scope=\"row\"{}>{}</th>", row[k].size() > 40 ? " class=\"long\"" : "",
+                                  escaped(row[k]))
+                    : fmt::format("<td{}>{}</td>", k < form.size() ? form[k] : "", escaped(row[k]));
     }
     out += "</tr>\n";
   }
@@ -114,32 +161,39 @@ std::string poses_table(const std::vector<std::array<double, joint_count>>& q_ra
   return table(columns, rows);
 }
 
-std::string summary_row(const char* name, double before, double after) {
-  const std::string change = after > 0 && before > 0 ? fmt::format("{:.1f} ×", before / after) : "–";
-  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n", name,
-                     shown(before), shown(after), change);
-}
-
 std::string summary_table(const PagePoses& set, const ErrorPairs& position, const ErrorPairs& orientation) {
+  std::vector<Cells> rows;
+  const auto add = [&](const char* name, double before, double after) {
+    rows.push_back({name, shown(before), shown(after), change_text(before, after, set.exact)});
+  };
   const Numbers pb = numbers_of(position.before), pa = numbers_of(position.after);
-  std::string out = fmt::format(
-      "<table class=\"summary\"><thead><tr><th scope=\"col\">error</th><th scope=\"col\">before</th>"
-      "<th scope=\"col\">after</th><th scope=\"col\">smaller by</th></tr></thead><tbody>\n");
-  out += summary_row("mean [mm]", pb.mean, pa.mean);
-  out += summary_row("median [mm]", pb.median, pa.median);
-  out += summary_row("rms [mm]", pb.rms, pa.rms);
-  out += summary_row("largest [mm]", pb.max, pa.max);
+  add("mean [mm]", pb.mean, pa.mean);
+  add("median [mm]", pb.median, pa.median);
+  add("rms [mm]", pb.rms, pa.rms);
+  add("largest [mm]", pb.max, pa.max);
   if (!orientation.before.empty()) {
     const Numbers ob = numbers_of(orientation.before), oa = numbers_of(orientation.after);
-    out += summary_row("mean [deg]", ob.mean, oa.mean);
-    out += summary_row("largest [deg]", ob.max, oa.max);
+    add("mean [deg]", ob.mean, oa.mean);
+    add("largest [deg]", ob.max, oa.max);
   }
-  out += "</tbody></table>\n";
+  std::string out = table({"error", "before", "after", "change"}, rows, " class=\"summary\"");
+  if (set.exact)
+    out +=
+        "<p>As many numbers were fitted as were measured: the fit passes through all of them, and what is "
+        "left "
+        "says nothing.</p>\n";
   out += fmt::format(
       "<p class=\"key\"><span class=\"mark before\"></span> before: {} &nbsp; <span class=\"mark "
       "after\"></span> after: {}</p>\n",
       escaped(set.before), escaped(set.after));
   return out;
+}
+
+/// Where there are more poses than a drawing has room for.
+std::string part_text(std::size_t drawn, std::size_t all) {
+  if (drawn >= all) return "";
+  return fmt::format(" {} of {} poses are drawn: the largest errors and an even part of the others.", drawn,
+                     all);
 }
 
 /// What was recorded at the poses, against which the rest of the errors is drawn.
@@ -176,39 +230,43 @@ std::string poses_section(const PagePoses& set, std::size_t number, std::size_t 
   if (set.poses.empty()) return out + "<p>No poses.</p></section>\n";
   const ErrorPairs position = positions(set);
   const ErrorPairs orientation = orientations(set);
+  const std::size_t count = set.poses.size();
   out += fmt::format(
-      "<p class=\"headline\"><span class=\"before\">{} mm</span> → <span class=\"after\">{} mm</span> "
-      "<small>mean position error over {} poses</small></p>\n",
-      shown(numbers_of(position.before).mean), shown(numbers_of(position.after).mean), set.poses.size());
+      "<p class=\"headline\"><span class=\"before\">{}</span> → <span class=\"after\">{}</span> "
+      "<small>mean position error over {} pose{}</small></p>\n",
+      length_text(numbers_of(position.before).mean), length_text(numbers_of(position.after).mean), count,
+      count == 1 ? "" : "s");
   out += summary_table(set, position, orientation);
-  const auto outliers =
-      std::count_if(set.poses.begin(), set.poses.end(), [](const PagePose& p) { return p.outlier; });
-  if (outliers > 0) {
+  if (!position.outliers.empty()) {
     std::string which;
     std::size_t named = 0;
-    for (std::size_t k = 0; k < set.poses.size() && named < 12; ++k) {
-      if (set.poses[k].outlier) which += fmt::format("{}{}", named++ > 0 ? ", " : "", k + 1);
+    for (const std::size_t k : position.outliers) {
+      if (named < 12) which += fmt::format("{}{}", named++ > 0 ? ", " : "", k + 1);
     }
-    out +=
-        fmt::format("<p>{} of {} poses lie far from the rest and do not count in full: {}{}.</p>\n", outliers,
-                    set.poses.size(), which, static_cast<std::size_t>(outliers) > named ? ", …" : "");
+    const std::size_t apart = position.outliers.size();
+    out += fmt::format("<p>{} of {} poses {} far from the rest and {} not count in full: {}{}.</p>\n", apart,
+                       count, apart == 1 ? "lies" : "lie", apart == 1 ? "does" : "do", which,
+                       apart > named ? ", …" : "");
   }
+  const char* marked = position.outliers.empty() ? "" : " A diamond: it lies far from the rest.";
   out += fmt::format("<div class=\"explore\" data-set=\"{}\"></div>\n<div class=\"plots wide\">\n", number);
-  out += still(
-      figure(plot_in_order(position, detail), "Position error of each pose, in the order of the data."));
+  out += still(figure(plot_in_order(position, detail),
+                      fmt::format("Position error of each pose, in the order of the data.{}{}", marked,
+                                  part_text(std::min(count, detail.dots), count))));
   out += figure(plot_sorted(position, detail),
                 "Position error, sorted: the share of the poses whose error lies below a value.");
   out += still(figure(plot_histogram(position), "How many poses have which position error."));
   if (!orientation.before.empty()) {
     out += figure(plot_sorted(orientation, detail), "Orientation error, sorted.");
   }
-  out +=
+  out += fmt::format(
       "</div>\n<div class=\"still\"><h3>What is left, against each joint and whatever else was "
       "recorded</h3>\n"
       "<p>The three components of the position error after: "
       "<span class=\"mark x\"></span> x, <span class=\"mark y\"></span> y, <span class=\"mark z\"></span> z. "
       "Noise has no shape here; a curve or a slope is an effect that the model does not have. Poses far off "
-      "the others are drawn at the edge.</p>\n<div class=\"plots\">\n";
+      "the others are drawn at the edge.{}{}</p>\n<div class=\"plots\">\n",
+      marked, part_text(std::min(count, detail.dots_of_three), count));
   for (const Covariate& c : covariates(set)) {
     out += figure(plot_against(set.poses, c.values, c.axis, c.words, detail),
                   fmt::format("Against {}.", escaped(c.words)));
@@ -264,12 +322,19 @@ std::string parameter_table(const Page& page) {
   if (page.parameters.empty()) return "";
   std::map<std::string, std::vector<std::string>> carried;
   for (const PageConfounded& c : page.confounded) {
-    for (const std::string& by : c.with) carried[by].push_back(c.parameter);
+    for (const std::string& by : c.with) {
+      // A column for those alone that the table has.
+      if (std::any_of(page.parameters.begin(), page.parameters.end(),
+                      [&](const PageParameter& p) { return p.name == by; }))
+        carried[by].push_back(c.parameter);
+    }
   }
+  const bool frames = std::any_of(page.parameters.begin(), page.parameters.end(),
+                                  [](const PageParameter& p) { return p.name.starts_with("frame_"); });
   std::string out = fmt::format(
       "<section><h2>Parameters</h2>\n<p>Estimates with one standard deviation. Pale: not larger than twice "
       "its own "
-      "uncertainty, so it may as well be zero.{}</p>\n<div class=\"scroll\"><table "
+      "uncertainty, so it may as well be zero.{}{}</p>\n<div class=\"scroll\"><table "
       "class=\"parameters\"><thead><tr>"
       "<th scope=\"col\">parameter</th><th scope=\"col\">value</th><th scope=\"col\">±</th><th "
       "scope=\"col\">unit</th>"
@@ -277,6 +342,10 @@ std::string parameter_table(const Page& page) {
       carried.empty() ? ""
                       : " What carries a parameter that cannot be told from it has the sum of both, as "
                         "far as they act alike.",
+      frames
+          ? " frame_f: the base in the frame of the measurement; frame_e: the measured point in that of the "
+            "tool; turns as axis times angle."
+          : "",
       carried.empty() ? "" : "<th scope=\"col\">carries</th>");
   for (const PageParameter& p : page.parameters) {
     const auto [value, sigma] = with_uncertainty(p.value, p.sigma);
@@ -363,7 +432,13 @@ std::string plan_section(const PagePlan& plan) {
                   false,
                   {{"", {}, CurveStyle::steps, "", {}}}};
   for (const auto& [work, value] : plan.progress) progress.curves[0].points.push_back({work / 1e3, value});
-  out += figure(plot_curves(progress), "The criterion of the best set so far, over the work done.");
+  progress.x_from_zero = true;
+  auto& points = progress.curves[0].points;
+  // What was found last held until the end.
+  if (!points.empty() && plan.evaluations / 1e3 > points.back()[0])
+    points.push_back({plan.evaluations / 1e3, points.back()[1]});
+  if (points.size() > 1)
+    out += figure(plot_curves(progress), "The criterion of the best set so far, over the work done.");
   out += "</div>\n" + poses_table(plan.q_rad, plan.payload_kg, 3);
   out +=
       "</section>\n<section><h2>What to expect</h2>\n<p>One standard deviation of each parameter that these "
@@ -374,9 +449,26 @@ std::string plan_section(const PagePlan& plan) {
   return out + table({"parameter", "±", "unit"}, rows, " class=\"parameters\"") + "</section>\n";
 }
 
-/// Only places beside this page or inside it: a report never leads into the network.
+/// Only places beside this page or inside it: a report never leads into the network. Browsers take a backslash for a
+/// slash, and leave control characters and a blank at the start out before they look.
 bool is_local(const std::string& href) {
-  return !href.empty() && href.find(':') == std::string::npos && !href.starts_with("//");
+  return !href.empty() && href[0] != '/' && href[0] != ' ' &&
+         std::none_of(href.begin(), href.end(), [](char c) {
+           return c == ':' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
+         });
+}
+
+/// What is wrong with a result that the numbers themselves say.
+std::vector<std::string> doubts_of(const Page& page) {
+  std::vector<std::string> doubts = page.doubts;
+  for (const PagePoses& set : page.poses) {
+    const ErrorPairs position = positions(set);
+    const double before = numbers_of(position.before).mean, after = numbers_of(position.after).mean;
+    if (after > 1.05 * before)
+      doubts.push_back(fmt::format("{}: the errors are larger after than before (mean {} before, {} after).",
+                                   set.title, length_text(before), length_text(after)));
+  }
+  return doubts;
 }
 
 /// Drawn by the script; where there is none, a sentence stands there.
@@ -415,9 +507,9 @@ std::string html(const Page& page, bool web) {
       escaped(page.title), page_style, closed, web ? web_style() : "");
   if (!page.summary.empty()) out += fmt::format("<p class=\"lead\">{}</p>\n", escaped(page.summary));
   out += "</header>\n";
-  if (!page.doubts.empty()) {
+  if (const std::vector<std::string> doubts = doubts_of(page); !doubts.empty()) {
     out += "<section class=\"doubts\"><h2>Do not rely on this yet</h2>\n<ul>\n";
-    for (const std::string& doubt : page.doubts) out += fmt::format("<li>{}</li>\n", escaped(doubt));
+    for (const std::string& doubt : doubts) out += fmt::format("<li>{}</li>\n", escaped(doubt));
     out += "</ul></section>\n";
   }
   if (!page.facts.empty()) {

@@ -48,6 +48,7 @@ struct PagePoses {
   std::optional<MeasurementFrames> frames;
   /// Mean length of the measurement's own error: nothing can be seen below it. Drawn where it is given.
   std::optional<double> noise_floor_m;
+  bool exact = false;  ///< fitted with as many unknowns as numbers: what is left says nothing
 };
 
 struct PageParameter {
@@ -93,6 +94,7 @@ struct PageLink {
 /// A plan of measurement poses.
 struct PagePlan {
   std::vector<std::pair<double, double>> progress;  ///< evaluations and criterion at each improvement
+  double evaluations = 0;                           ///< in all: the last criterion held until then
   std::vector<std::array<double, joint_count>> q_rad;
   std::vector<double> payload_kg;                            ///< per pose, or empty
   std::vector<std::array<double, joint_count>> known_q_rad;  ///< measured already

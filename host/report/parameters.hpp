@@ -9,7 +9,7 @@
 
 namespace flexcomp::host {
 
-/// Appends the parameters with their uncertainty, and what could not be told apart.
+/// Appends the parameters and the fitted numbers of the frames with their uncertainty, and what could not be told apart.
 void add_parameters(Page& page, const Calibration& calibration, const RobotFile& robot);
 
 }  // namespace flexcomp::host

@@ -28,7 +28,12 @@ struct ErrorPairs {
   std::vector<double> after;
   std::string unit;  ///< "mm" or "deg"
   std::optional<double> floor;
+  std::string quantity = "error";          ///< of the axis: "position error"
+  std::vector<std::size_t> outliers = {};  ///< ascending; marked where each pose is drawn
 };
+
+/// Whether an axis for both would press one of them onto zero, were it not logarithmic.
+bool is_logarithmic(const ErrorPairs& errors);
 
 enum class CurveStyle {
   usual,   ///< a line, with dots where they are few; over cases dots alone
@@ -42,12 +47,15 @@ struct Curve {
   std::string name;
   std::vector<std::array<double, 2>> points;  ///< x, y
   CurveStyle style = CurveStyle::usual;
-  std::string colour = {};  ///< after, before, x, y, z, floor; empty: by its place in the list
+  /// after, before, x, y, z; empty: by its place in the list, told apart by colour and by dashes
+  std::string colour = {};
   std::vector<std::array<double, 2>> band = {};  ///< low and high beside each point, or empty
 };
 
 /// Any quantity over any other: up to six curves with their names.
 struct Curves {
+  static constexpr std::size_t most = 6;
+
   std::string described;  ///< for those who do not see it
   std::string x_name;
   std::string y_name;
@@ -56,7 +64,9 @@ struct Curves {
   bool log_y = false;
   std::vector<Curve> curves;
   std::optional<double> floor = {};  ///< the noise, as a line across
+  bool x_from_zero = false;          ///< the axis begins there, whatever the curves do
 };
+/// \return empty where there is nothing to draw
 std::string plot_curves(const Curves& curves);
 
 /// Each pose in the order of the data, before above after.
@@ -81,6 +91,7 @@ struct Bars {
   std::vector<double> before;
   std::vector<double> after;  ///< as many, or none
 };
+/// \return empty where all are 0
 std::string plot_bars(const Bars& bars);
 
 /// Where the poses of a plan lie between each joint's limits; those that were measured already above them.

@@ -28,7 +28,10 @@ void add_covariates(PagePoses& set, const std::vector<Observation>& rows) {
   using Row = const Observation&;
   add_covariate(set, "payload [kg]", rows, [](Row r) { return r.context.payload_kg; });
   add_covariate(set, "temperature [°C]", rows, [](Row r) { return r.context.temperature_c; });
-  add_covariate(set, "time [s]", rows, [](Row r) { return r.context.time_s; });
+  // A clock counts from 1970 or from its own start: neither says anything.
+  const double start = rows.empty() ? 0 : rows.front().context.time_s;
+  add_covariate(set, "time since the first row [s]", rows,
+                [start](Row r) { return r.context.time_s - start; });
   static constexpr std::array<const char*, 3> forces{"force x [N]", "force y [N]", "force z [N]"};
   for (std::size_t k = 0; k < 3; ++k)
     add_covariate(set, forces[k], rows, [k](Row r) { return r.context.force_n[k]; });
@@ -52,9 +55,10 @@ void add_covariates(PagePoses& set, const std::vector<Observation>& rows) {
 }  // namespace
 
 PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
-                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers) {
+                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers,
+                     bool frames_fitted) {
   PagePoses set;
-  set.before = "nominal model";
+  set.before = frames_fitted ? "nominal model, frames fitted" : "nominal model";
   set.after = "calibrated model";
   for (std::size_t k = 0; k < rows.size(); ++k) {
     PagePose pose;
@@ -87,22 +91,39 @@ Page titled_page(const std::string& title, const RobotFile& robot) {
 
 namespace {
 
+/// The error of the nominal arm with the frames that the summary does not have.
+void add_other_before(Page& page, const Before& before, bool frames_fitted) {
+  if (frames_fitted) {
+    page.facts.push_back({"nominal model, frames nominal: mean [mm]",
+                          fmt::format("{:.3f}", before.nominal_frames.mean_m * 1e3)});
+  } else if (before.fitted_frames) {
+    page.facts.push_back({"nominal model, frames fitted: mean [mm]",
+                          fmt::format("{:.3f}", before.fitted_frames->mean_m * 1e3)});
+  }
+}
+
+/// To the micrometre, and never a nought for what is none.
+std::string mm_text(double metres) {
+  return metres > 0 && metres < 5e-7 ? std::string("< 0.001") : fmt::format("{:.3f}", metres * 1e3);
+}
+
 std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) {
-  return fmt::format("Mean position error {:.3f} mm before, {:.3f} mm after.", before.mean_m * 1e3,
-                     after.mean_m * 1e3);
+  return fmt::format("Mean position error {} mm before, {} mm after.", mm_text(before.mean_m),
+                     mm_text(after.mean_m));
 }
 
 }  // namespace
 
 namespace {
 
-PageSection models_section(const std::vector<ModelFit>& compared) {
+PageSection models_section(const std::vector<ModelFit>& compared, bool without_priors) {
   PageSection section;
   section.title = "Which model?";
-  section.paragraphs = {
-      "The models of the paper, each fitted anew to these rows. What a model gains on the rows that it is "
+  section.paragraphs = {fmt::format(
+      "The models of the paper, each fitted anew to these rows{}. What a model gains on the rows that it is "
       "fitted to may be noise that it has learnt; what it gains on rows left out is the arm. Left out: each "
-      "row in turn, predicted by a fit to all the others."};
+      "row in turn, predicted by a fit to all the others.",
+      without_priors ? ", without the --fix and --tolerances of this run" : "")};
   section.columns = {
       "model",        "parameters",        "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
       "largest [mm]", "chi-square per dof"};
@@ -114,7 +135,6 @@ PageSection models_section(const std::vector<ModelFit>& compared) {
       {},
       true,
       {}};
-  static constexpr std::array<const char*, 4> colours{"after", "y", "z", "before"};
   bool partly = false;
   for (const ModelFit& m : compared) {
     section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm(m.fitted.mean_m),
@@ -122,7 +142,7 @@ PageSection models_section(const std::vector<ModelFit>& compared) {
                             m.left_out ? mm(m.left_out->max_m) : "–", fmt::format("{:.3g}", m.chi2_per_dof)});
     partly = partly || !m.left_out;
     if (!m.left_out) continue;
-    Curve curve{model_words(m.kind), {}, CurveStyle::line, colours[static_cast<std::size_t>(m.kind)], {}};
+    Curve curve{model_words(m.kind), {}, CurveStyle::line};
     std::vector<double> sorted = m.left_out_m;
     std::sort(sorted.begin(), sorted.end(), std::greater<>());
     constexpr std::size_t most = 200;
@@ -144,7 +164,7 @@ PageSection models_section(const std::vector<ModelFit>& compared) {
 }  // namespace
 
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
-             const std::string& data, const std::vector<ModelFit>& compared) {
+             const std::string& data, const std::vector<ModelFit>& compared, bool without_priors) {
   Page p = titled_page("Identification of " + robot.name, robot);
   p.summary =
       gained(statistics(r.nominal, rows), r.after) + " On the poses that were fitted: validate on others.";
@@ -153,16 +173,20 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
              {"poses", fmt::format("{}", rows.size())},
              {"parameters identifiable", fmt::format("{} of {}", r.identifiable, r.parameters)},
              {"numbers of the frames", fmt::format("{}", r.frame_parameters)},
-             {"chi-square per degree of freedom", fmt::format("{:.3g}", r.fit.chi2_per_dof())},
+             {"chi-square per degree of freedom",
+              r.fit.degrees_of_freedom > 0 ? fmt::format("{:.3g}", r.fit.chi2_per_dof()) : "–"},
              {"condition", fmt::format("{:.3g}", r.condition)},
              {"O1", fmt::format("{:.3g}", r.o1)},
              {"converged", r.fit.converged ? "yes" : "no"},
              {"rows outside the bulk", fmt::format("{}", r.outliers.size())}};
-  PagePoses set = page_poses(r.nominal, r.residuals, rows, r.outliers);
+  const bool frames_fitted = r.calibration.frames.has_value();
+  add_other_before(p, r.before, frames_fitted);
+  PagePoses set = page_poses(r.nominal, r.residuals, rows, r.outliers, frames_fitted);
   set.title = "Poses that were fitted";
+  set.exact = !(r.fit.degrees_of_freedom > 0);
   set.frames = r.calibration.frames;
   p.poses.push_back(set);
-  if (!compared.empty()) p.further.push_back(models_section(compared));
+  if (!compared.empty()) p.further.push_back(models_section(compared, without_priors));
   add_parameters(p, r.calibration, robot);
   p.missing = r.known.missing;
   for (const CuringPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
@@ -178,7 +202,9 @@ Page page_of(const Validation& v, const std::vector<Observation>& rows, const Ro
              {"calibration", calibration.path},
              {"poses", fmt::format("{}", rows.size())},
              {"chi-square per degree of freedom", fmt::format("{:.3g}", v.chi2_per_dof())}};
-  PagePoses set = page_poses(v.nominal, v.residuals, rows, {});
+  const bool frames_fitted = calibration.frames.has_value();
+  add_other_before(p, v.before, frames_fitted);
+  PagePoses set = page_poses(v.nominal, v.residuals, rows, {}, frames_fitted);
   set.title = "Poses that were not fitted";
   set.frames = calibration.frames;
   p.poses.push_back(set);

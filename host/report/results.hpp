@@ -16,9 +16,10 @@
 
 namespace flexcomp::host {
 
-/// \param compared  compare_models(), or none
+/// \param compared        compare_models(), or none
+/// \param without_priors  the run fixed parameters or had tolerances, which compare_models() drops
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
-             const std::string& data, const std::vector<ModelFit>& compared);
+             const std::string& data, const std::vector<ModelFit>& compared, bool without_priors = false);
 Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
              const Calibration& calibration, const std::string& data);
 
@@ -29,7 +30,8 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
 /// What pages of results have in common: a page with its title and who made it when, and the rows as poses of a page.
 Page titled_page(const std::string& title, const RobotFile& robot);
 PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
-                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers);
+                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers,
+                     bool frames_fitted);
 
 }  // namespace flexcomp::host
 

@@ -6,24 +6,32 @@
 
 namespace flexcomp::host {
 
-std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::size_t limit) {
-  std::vector<std::size_t> rows(poses.size());
+std::vector<std::size_t> shown_rows(const std::vector<const std::vector<double>*>& sizes, std::size_t limit) {
+  std::vector<std::size_t> rows(sizes.empty() ? 0 : sizes.front()->size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
   if (rows.size() <= limit) return rows;
-  const auto size = [&](std::size_t k) {
-    const auto& e = poses[k].after_m;
-    return std::hypot(e[0], e[1], e[2]);
-  };
-  const auto large = static_cast<std::ptrdiff_t>(limit / 20);
-  std::nth_element(rows.begin(), rows.begin() + large, rows.end(),
-                   [&](std::size_t a, std::size_t b) { return size(a) > size(b); });
-  std::sort(rows.begin() + large, rows.end());
-  std::vector<std::size_t> shown(rows.begin(), rows.begin() + large);
-  const std::size_t others = rows.size() - shown.size(), wanted = limit - shown.size();
-  for (std::size_t k = 0; k < wanted; ++k)
-    shown.push_back(rows[static_cast<std::size_t>(large) + k * others / wanted]);
+  std::vector<std::size_t> shown;
+  for (const auto* size : sizes) {
+    const auto large = static_cast<std::ptrdiff_t>(limit / 20);
+    std::nth_element(rows.begin(), rows.begin() + large, rows.end(),
+                     [&](std::size_t a, std::size_t b) { return (*size)[a] > (*size)[b]; });
+    shown.insert(shown.end(), rows.begin(), rows.begin() + large);
+    rows.erase(rows.begin(), rows.begin() + large);
+  }
+  std::sort(rows.begin(), rows.end());
+  const std::size_t wanted = limit - shown.size();
+  for (std::size_t k = 0; k < wanted; ++k) shown.push_back(rows[k * rows.size() / wanted]);
   std::sort(shown.begin(), shown.end());
   return shown;
+}
+
+std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::size_t limit) {
+  std::vector<double> after, before;
+  for (const PagePose& p : poses) {
+    after.push_back(std::hypot(p.after_m[0], p.after_m[1], p.after_m[2]));
+    before.push_back(std::hypot(p.before_m[0], p.before_m[1], p.before_m[2]));
+  }
+  return shown_rows({&after, &before}, limit);
 }
 
 }  // namespace flexcomp::host

@@ -10,9 +10,13 @@
 
 namespace flexcomp::host {
 
-/// All, where they are at most `limit`. Else as many as that: the twentieth part with the largest errors after, and of the
-/// others every n-th. Ascending.
+/// All, where they are at most `limit`. Else as many as that: the twentieth part with the largest errors after, as many
+/// with the largest before, and of the others every n-th. Ascending.
 std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::size_t limit);
+
+/// The same by the sizes themselves: a twentieth part by each list.
+/// \param sizes  as many numbers each
+std::vector<std::size_t> shown_rows(const std::vector<const std::vector<double>*>& sizes, std::size_t limit);
 
 }  // namespace flexcomp::host
 

@@ -57,6 +57,7 @@ export function picture(page) {
     const near = {before: 0, after: 0, beam: 0};
     let filled = 0;
     let sum = 0;
+    let edge = 0;  // coloured pixels on the rim: something leaves the picture
     const colours = new Set();
     for (let k = 0; k < pixels.length; k += 4) {
       const [r, g, b, a] = pixels.subarray(k, k + 4);
@@ -64,12 +65,16 @@ export function picture(page) {
       ++filled;
       colours.add((r >> 3) << 10 | (g >> 3) << 5 | b >> 3);
       sum = (sum * 31 + r + 256 * g + 65536 * b + k) % 1000000007;
+      const x = (k / 4) % width;
+      const y = Math.floor(k / 4 / width);
+      // Of what can be seen through the colours are as much darker.
+      if (a > 40 && (x < 2 || y < 2 || x > width - 3 || y > height - 3) && Math.max(r, g, b) - Math.min(r, g, b) > 0.25 * a) ++edge;
       if (a < 200) continue;
       if (r > g + 40 && g > b + 30) ++near.before;  // orange
       if (b > r + 60 && g > r + 20 && b > g + 20) ++near.after;  // blue, not the violet of an axis
       if (g > r + 30 && g > b + 20) ++near.beam;  // green
     }
-    return {width, height, filled, colours: colours.size, near, sum};
+    return {width, height, filled, colours: colours.size, near, sum, edge};
   });
 }
 

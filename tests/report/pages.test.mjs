@@ -9,7 +9,7 @@ import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
 import {chain, measuredPoint, toolFrame} from '../../host/report/web/src/chain.js';
-import {jointsOf, norm, readData} from '../../host/report/web/src/data.js';
+import {jointsOf, lengthText, norm, readData, shown, tickText} from '../../host/report/web/src/data.js';
 import {inked, launch, open, picture, settled} from './browser.mjs';
 
 const source = process.env.FLEXCOMP_SOURCE_DIR;
@@ -41,6 +41,7 @@ function dataOf(name) {
   return readData(text);
 }
 
+const longName = 'm'.repeat(78);
 const pages = {
   identify: 'identify.html', validate: 'validate.html', plan: 'plan.html', diagnose: 'diagnose.html', report: 'report.html',
 };
@@ -57,7 +58,7 @@ before(async () => {
   flexcomp('validate', '--robot', robot, '--calibration', 'cal.yaml', '--data', 'others.csv', '--report', pages.validate,
     '--json', 'validated.json');
   flexcomp('plan', '--robot', robot, '--cell', join(source, 'docs/examples/cell.yaml'), '--poses', '14', '--payloads',
-    '0,1.108', '--effort', '0.1', '-o', 'plan.csv', '--report', pages.plan);
+    '0,1.108', '--effort', '0.1', '--extend', 'others.csv', '-o', 'plan.csv', '--report', pages.plan);
   flexcomp('diagnose', '--robot', robot, '--data', 'hidden.csv', '--holdout', 'kept.csv', '-o', 'found.yaml', '--report',
     pages.diagnose);
   // The files of where an arm went: here the joints of the data with made-up errors, a row's own number among them.
@@ -68,8 +69,9 @@ before(async () => {
     writeFileSync(at(name), `${[head, ...q1.map((_, k) => row(k, size))].join('\n')}\n`);
   }
   flexcomp('report', '--robot', robot, '--calibration', 'cal.yaml', '--errors', 'There=went_before.csv,went_after.csv',
-    '--errors', 'Back=went_after.csv,went_after.csv', '--result', 'Others=validated.json', '--title', '</script><b>title',
-    '--summary', 'A summary', '-o', pages.report);
+    '--errors', 'Back=went_after.csv,went_after.csv', '--result', 'Others=validated.json', '--title', `</script><b>title ${longName}`,
+    '--summary', `A summary ${longName}`, '--fact', `${longName}=${longName}`, '--link', `${longName}.html=${longName}`,
+    '-o', pages.report);
   browser = await launch();
 });
 after(() => browser?.close());
@@ -113,8 +115,9 @@ test('the numbers of the page are those of the data', () => {
     assert.equal(set.line[k], k + 2);
   }
   const covariate = (start) => set.covariates.find((c) => c.name.startsWith(start)).values;
-  for (const [name, column] of [['payload', 'payload_kg'], ['temperature', 'temp_c'], ['time', 'time_s']]) {
-    covariate(name).forEach((v, k) => assert.ok(Math.abs(v - data[column][k]) <= 1e-3 * Math.max(...data[column].map(Math.abs)),
+  for (const [name, column, start] of [['payload', 'payload_kg', 0], ['temperature', 'temp_c', 0],
+    ['time since the first row [s]', 'time_s', data.time_s[0]]]) {
+    covariate(name).forEach((v, k) => assert.ok(Math.abs(v - (data[column][k] - start)) <= 1e-3 * Math.max(...data[column].map(Math.abs)),
       `${name} ${v} ${data[column][k]}`));
   }
   // Before: the nominal arm's error, as validate counts it of the same rows.
@@ -139,6 +142,16 @@ test('errors are drawn in the frame of the arm, wherever the instrument stands',
     assert.ok(norm(a) > 0.01);
     a.forEach((v, i) => assert.ok(Math.abs(v - b[i]) < 0.02 * norm(a) + 2e-3, `pose ${k + 1}: ${a} and ${b}`));
   }
+  // What carries is on the page, with its uncertainty; and "before" says which frames it had.
+  const text = readFileSync(at('place1.html'), 'utf8');
+  const carriers = [...text.matchAll(/carried by (.*?)<\/li>/g)].flatMap((m) => [...m[1].matchAll(/<code>(.*?)<\/code>/g)].map((c) => c[1]));
+  assert.ok(carriers.some((name) => name.startsWith('frame_')), `${carriers}`);
+  for (const name of carriers) assert.match(text, new RegExp(`<th scope="row">${name.replace(/[[\].]/g, '\\$&')}</th><td>-?[\\d.e-]+</td><td>[\\d.e-]+</td>`));
+  assert.match(text, /before: nominal model, frames fitted/);
+  assert.match(text, /nominal model, frames nominal: mean \[mm\]/);
+  const nominal = readFileSync(at(pages.identify), 'utf8');
+  assert.match(nominal, /before: nominal model &nbsp/);
+  assert.match(nominal, /nominal model, frames fitted: mean \[mm\]/);
 });
 
 const said = {
@@ -170,6 +183,15 @@ for (const [command, file] of Object.entries(pages)) {
       for (const word of said[command]) assert.ok(text.includes(word), `${where}: no "${word}"`);
       assert.deepEqual(troubles, [], where);
       await page.screenshot({path: at(`${command}_${width}_${scheme}.png`), fullPage: true});
+      if (scheme === all[0][1] && width === 390) {
+        // The narrowest that there is, with every name as long as it may be.
+        await page.setViewportSize({width: 320, height: 700});
+        await settled(page);
+        const narrow = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth,
+          [...document.querySelectorAll('main *')].filter((e) => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('.scroll, svg'))
+            .map((e) => `${e.tagName}.${e.className}`).slice(0, 5)]);
+        assert.ok(narrow[0] <= narrow[1] && narrow[2].length === 0, `${command}, 320 px: ${narrow}`);
+      }
       await close();
     }
   });
@@ -242,7 +264,7 @@ test('errors against everything that was recorded, and a dot that is clicked', a
   const against = page.locator('.explore select').nth(1);
   const names = await against.locator('option').allTextContents();
   for (const wanted of ['q1 [deg]', 'q2 [deg]', 'q3 [deg]', 'q4 [deg]', 'q5 [deg]', 'q6 [deg]', 'payload [kg]',
-    'temperature [°C]', 'time [s]', 'order of the data']) assert.ok(names.includes(wanted), `${wanted} of ${names}`);
+    'temperature [°C]', 'time since the first row [s]', 'order of the data']) assert.ok(names.includes(wanted), `${wanted} of ${names}`);
   for (const kind of ['size', 'x', 'turned']) {
     await page.locator('.explore select').first().selectOption(kind);
     for (let k = 0; k < names.length; ++k) {
@@ -290,9 +312,190 @@ test('errors against everything that was recorded, and a dot that is clicked', a
   await close();
 });
 
+test('a component has no logarithm, and what is left has classes of its own', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify));
+  const {sets: [set]} = dataOf(pages.identify);
+  const box = page.getByLabel('logarithmic');
+  const panels = () => page.locator('.histogram .uplot').count();
+  assert.ok(await box.isChecked());
+  assert.equal(await panels(), 1);
+  for (const kind of ['x', 'y', 'z']) {
+    await page.locator('.explore select').first().selectOption(kind);
+    assert.ok(await box.isDisabled() && !(await box.isChecked()), kind);
+    assert.equal(await panels(), 2, 'before and after by themselves: the one is a single bar among the classes of the other');
+    for (const which of ['before', 'after']) {
+      const values = Array.from({length: 60}, (_, k) => set.error(which, k)['xyz'.indexOf(kind)]);
+      const {edges, counts} = set.histogram(kind, which, false);
+      assert.ok(edges[0] <= Math.min(...values) + 1e-4 && edges.at(-1) >= Math.max(...values) - 1e-4);
+      assert.equal(counts[which].reduce((a, b) => a + b), 60);
+      assert.ok(counts[which].filter((n) => n > 0).length >= 6, `${kind} ${which}: ${counts[which]}`);
+    }
+  }
+  await page.check('.explore .choice input[value=after]', {force: true});
+  assert.equal(await panels(), 1);
+  assert.match(await page.getAttribute('.histogram', 'aria-label'), /of 60 poses: after most often from/);
+  await page.locator('.explore select').first().selectOption('size');
+  assert.ok(await box.isChecked() && await box.isEnabled());
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('numbers keep their digits and ticks their length', () => {
+  assert.deepEqual([0, 1.234, 0.00123, 4e-7].map(shown), ['0', '1.23', '0.00123', '< 0.00001']);
+  assert.deepEqual([0, 1.234, -4e-5, 4e-7, 1e-12].map(lengthText), ['0 mm', '1.23 mm', '-0.0400 µm', '0.400 nm', '< 0.001 nm']);
+  assert.deepEqual([0, 0.05, 2500, 1e-5, 5e-12, 1763749284, null].map(tickText),
+    ['0', '0.05', '2500', '10⁻⁵', '5·10⁻¹²', '1.76375·10⁹', '']);
+});
+
+test('a lost context comes back with its picture', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify), {width: 600});
+  const seen = await picture(page);
+  await page.evaluate(async () => {
+    const canvas = document.querySelector('.stage canvas');
+    const lose = canvas.getContext('webgl2').getExtension('WEBGL_lose_context');
+    const event = (name) => new Promise((done) => { canvas.addEventListener(name, done, {once: true}); });
+    const [lost, back] = [event('webglcontextlost'), event('webglcontextrestored')];
+    lose.loseContext();
+    await lost;
+    await new Promise((done) => { setTimeout(done, 0); });
+    lose.restoreContext();
+    await back;
+  });
+  await settled(page);
+  assert.deepEqual(await picture(page), seen);
+  assert.deepEqual(troubles.filter((t) => !/context/i.test(t)), []);
+  await close();
+});
+
+test('by keyboard and to those who listen', async () => {
+  const {page, troubles, close} = await open(browser, at(pages.identify), {width: 800});
+  const seen = new Set([(await picture(page)).sum]);
+  await page.focus('.stage canvas');
+  for (const key of ['ArrowLeft', 'ArrowUp', '+', '-']) {
+    await page.keyboard.press(key);
+    await settled(page);
+    const {sum} = await picture(page);
+    assert.ok(key === '-' || !seen.has(sum), `${key} changes nothing`);
+    seen.add(sum);
+  }
+  assert.match(await page.getAttribute('.stage canvas', 'aria-label'), /^The arm with the position errors of 60 poses/);
+  for (const readout of ['.view3d .readout', '.explore .readout']) assert.equal(await page.getAttribute(readout, 'role'), 'status');
+  assert.match(await page.getAttribute('.view3d .length', 'aria-valuetext'), /^[\d,]+ times$/);
+  await page.focus('.view3d .length');
+  const times = await page.getAttribute('.view3d .length', 'aria-valuetext');
+  await page.keyboard.press('ArrowRight');
+  assert.notEqual(await page.getAttribute('.view3d .length', 'aria-valuetext'), times);
+  // From dot to dot in the order of the axis; the one that is read and the one that was chosen are ringed.
+  const rings = (kind) => page.locator(`.scatter .ring.${kind}:visible`).count();
+  assert.match(await page.getAttribute('.scatter', 'aria-label'), /position error \[mm\] against q1 \[deg\], 60 poses: before .* mm, after /);
+  assert.equal(await rings('chosen'), 2, 'the pose in which the arm stands');
+  assert.equal(await rings('found'), 0);
+  // The ring is where the dot is: on the axis, which reaches 3 % further than the values on both sides.
+  const {q1_deg: q1} = csv('fitted.csv');
+  const [low, high] = [Math.min(...q1), Math.max(...q1)];
+  const wide = await page.locator('.scatter .u-over').evaluate((e) => e.clientWidth);
+  const against = page.locator('.explore select').nth(1);
+  for (const joint of ['1', '0']) {
+    await against.selectOption(joint);
+    await settled(page);
+  }
+  const ringed = await page.locator('.scatter .ring.chosen').first().evaluate((e) => parseFloat(e.style.left));
+  assert.ok(Math.abs(ringed / wide - ((q1[0] - low) / (high - low) + 0.03) / 1.06) < 0.01, `${ringed} of ${wide}`);
+  await page.focus('.scatter');
+  const values = [];
+  for (let k = 0; k < 4; ++k) {
+    await page.keyboard.press('ArrowRight');
+    values.push(Number((await page.textContent('.explore .readout')).match(/^Pose \d+ .*q1 \[deg\] (-?[\d.]+)/)[1]));
+  }
+  assert.deepEqual(values, values.toSorted((a, b) => a - b));
+  assert.equal(await rings('found'), 2);
+  const number = (await page.textContent('.explore .readout')).match(/^Pose (\d+)/)[1];
+  await page.keyboard.press('Enter');
+  assert.match(await page.textContent('.view3d .readout'), new RegExp(`^Pose ${number} of 60`));
+  const place = (kind) => page.locator(`.scatter .ring.${kind}`).first().evaluate((e) => [e.style.left, e.style.top]);
+  assert.deepEqual(await place('chosen'), await place('found'));
+  assert.deepEqual(troubles, []);
+  await close();
+});
+
+test('rows that lie apart are marked, and errors that cannot be seen are spoken of', async () => {
+  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg';
+  const {q1_deg: q1, ...rest} = csv('fitted.csv');
+  const joints = (k) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k])].join(',');
+  const write = (name, error) => writeFileSync(at(name), `${[`${head},dx_mm,dy_mm,dz_mm`,
+    ...q1.slice(0, 20).map((_, k) => `${joints(k)},${error(k)}`)].join('\n')}\n`);
+  write('good.csv', (k) => `${0.1 + 0.01 * k},0,0`);
+  write('bad.csv', (k) => `${3 + k},1,0`);
+  write('tiny.csv', (k) => `${1e-7 * (k + 1)},0,0`);
+  write('none.csv', () => '0,0,0');
+  const titles = {Worse: 'good.csv,bad.csv', Tiny: 'good.csv,tiny.csv', None: 'good.csv,none.csv'};
+  flexcomp('report', '--robot', robot, ...Object.entries(titles).flatMap(([title, files]) => ['--errors', `${title}=${files}`]),
+    '-o', 'odd.html');
+  const {page, troubles, close} = await open(browser, at('odd.html'), {width: 600});
+  assert.match(await page.innerText('.doubts'), /Worse: the errors are larger after than before/);
+  assert.doesNotMatch(await page.innerText('main'), /0\.00000/);
+  // Arrows that grow are inside the picture too.
+  assert.equal((await picture(page)).edge, 0);
+  const words = async (title) => {
+    await page.locator('.view3d select').selectOption({label: title});
+    await settled(page);
+    return page.textContent('.scale');
+  };
+  assert.match(await words('Tiny'), /errors after are too short to be seen at this length: choose “after”/);
+  assert.match(await words('None'), /There are no errors after/);
+  assert.doesNotMatch(await words('Worse'), /after are too short|no errors/);
+  // A linear axis beside a linear drawing, for all three.
+  await words('None');
+  assert.deepEqual(await page.locator('.explore .check input').evaluateAll((boxes) => boxes.map((b) => b.checked)),
+    dataOf('odd.html').sets.map((set) => set.startsLogarithmic('size')));
+  await page.locator('.explore').nth(2).getByLabel('logarithmic').check();
+  assert.match(await page.locator('.explore').nth(2).innerText(), /Errors of 0 \(20\) lie on the lower edge/);
+  assert.deepEqual(troubles, []);
+  await close();
+  // One pose: the base with its axes is in the picture as well as the arm.
+  const one = await open(browser, at('arm.html'), {width: 600});
+  assert.equal((await picture(one.page)).edge, 0);
+  assert.match(await one.page.innerText('main'), /position error over 1 pose\n/);
+  await one.close();
+  const even = readFileSync(at(pages.identify), 'utf8');
+  writeFileSync(at('apart.html'), even.replace('"outlier":[]', '"outlier":[3,10]'));
+  const marked = await open(browser, at('apart.html'), {width: 500});
+  const plain = await open(browser, at(pages.identify), {width: 500});
+  assert.ok(await inked(marked.page, '.scatter') > await inked(plain.page, '.scatter') + 80, 'diamonds');
+  assert.match(await marked.page.innerText('.legend'), /lies far from the rest/);
+  assert.notEqual((await picture(marked.page)).sum, (await picture(plain.page)).sum);
+  for (const one of [marked, plain]) {
+    assert.deepEqual(one.troubles, []);
+    await one.close();
+  }
+});
+
+test('a study: a wide remark wraps, on paper too', async () => {
+  flexcomp('study', 'fig3', '--arm', 'tx60l', '--quiet', '--report', 'study.html');
+  for (const [width, media] of [[320, 'screen'], [700, 'print']]) {
+    const {page, troubles, close} = await open(browser, at('study.html'), {width});
+    await page.emulateMedia({media});
+    const size = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+    assert.ok(size[0] <= size[1], `${media}: ${size}`);
+    // Words of the other columns stay whole.
+    const lines = await page.locator('tbody th').evaluateAll((cells) =>
+      cells.map((e) => { const r = document.createRange(); r.selectNodeContents(e); return r.getClientRects().length; }));
+    assert.ok(lines.length === 4 && lines.every((n) => n === 1), `${media}: ${lines}`);
+    assert.deepEqual(await page.locator('thead th').allTextContents(), ['arm', 'model', 'parameters', 'paper', 'ours', 'remark']);
+    if (media === 'print') {
+      const out = await page.locator('td').evaluateAll((cells) => cells.filter((e) => e.getBoundingClientRect().right > innerWidth).length);
+      assert.equal(out, 0);
+    }
+    assert.deepEqual(troubles, []);
+    await close();
+  }
+});
+
 test('the plan has beams, bodies and all its poses', async () => {
   const {page, troubles, close} = await open(browser, at(pages.plan));
   const whole = await picture(page);
+  assert.ok(whole.near.before > 100, 'poses that were measured already');
+  assert.equal(whole.edge, 0, 'and they are inside the picture');
   assert.ok(whole.near.beam > 300, JSON.stringify(whole));
   assert.match(await page.textContent('.legend'), /planned poses.*beams from the instrument.*bodies/s);
   assert.match(await page.textContent('.view3d .readout'), /^Pose 1 of 14, with [\d.]+ kg; q1/);
@@ -306,6 +509,19 @@ test('the plan has beams, bodies and all its poses', async () => {
   assert.ok(one.near.beam < bare.near.beam && one.near.beam > 50, 'the beams of one pose');
   assert.deepEqual(troubles, []);
   await close();
+  // One folded pose to come, and the arm stretched out wherever it was measured already.
+  const text = readFileSync(at(pages.plan), 'utf8');
+  const [, json] = text.match(/id="data">(.*?)<\/script>/s);
+  const data = JSON.parse(json);
+  const reach = [[0, 0, 0, 0, 0, 0], [0, 90, 0, 0, 0, 0], [120, 90, 0, 0, 0, 0], [-120, 90, 0, 0, 0, 0]];
+  Object.assign(data.plan, {q: [0, 0, 150000, 0, 0, 0], payload: [0], known: reach.flat().map((v) => v * 1000), obstacles: []});
+  delete data.plan.tracker;
+  writeFileSync(at('known.html'), text.replace(json, () => JSON.stringify(data)));
+  const known = await open(browser, at('known.html'), {width: 600});
+  const all = await picture(known.page);
+  assert.ok(all.near.before > 10, JSON.stringify(all));
+  assert.equal(all.edge, 0, 'what was measured already leaves the picture');
+  await known.close();
 });
 
 test('several sets: one is chosen, each has its own plots', async () => {
@@ -342,6 +558,32 @@ test('on paper: drawings for plots, no buttons, light in a dark room too', async
   }
 });
 
+/** Pictures of a PDF, as they were compressed: that of the arm is the largest. */
+function imagesOf(pdf) {
+  const text = pdf.toString('latin1');
+  return [...text.matchAll(/\/Subtype ?\/Image\b[^]{0,300}?>> ?stream\r?\n([^]*?)\r?\nendstream/g)].map((m) => m[1])
+    .sort((a, b) => b.length - a.length);
+}
+
+test('from a dark screen onto white paper', async () => {
+  // Nothing is told to the page but that it is printed.
+  const printed = async (scheme) => {
+    const {page, troubles, close} = await open(browser, at(pages.identify), {width: 500, scheme});
+    const {sum} = await picture(page);
+    const images = imagesOf(await page.pdf({path: at(`from_${scheme}.pdf`), format: 'A4'}));
+    await settled(page);
+    assert.equal((await picture(page)).sum, sum, 'and back');
+    assert.deepEqual(troubles, []);
+    await close();
+    return {sum, images};
+  };
+  const [light, dark] = [await printed('light'), await printed('dark')];
+  assert.notEqual(dark.sum, light.sum);
+  assert.ok(light.images.length > 0 && light.images[0].length > 5000, `${light.images.map((i) => i.length)}`);
+  assert.deepEqual(dark.images.map((i) => i.length), light.images.map((i) => i.length));
+  assert.ok(dark.images[0] === light.images[0], 'another picture of the arm');
+});
+
 test('without scripts everything but the 3-D view is there', async () => {
   for (const [command, file] of Object.entries(pages)) {
     const {page, close} = await open(browser, at(file), {width: 390, scripts: false});
@@ -361,7 +603,12 @@ test('without WebGL a sentence stands there, and the plots work', async () => {
     assert.equal(await page.locator('.stage').count(), 0);
     assert.ok(await inked(page, '.scatter') > 2000);
     const plot = await page.locator('.scatter .u-over').boundingBox();
+    assert.doesNotMatch(await page.textContent('.explore .readout'), /the arm/);
     await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
+    await page.focus('.scatter');
+    await page.keyboard.press('ArrowRight');
+    await page.keyboard.press('Enter');
+    assert.equal(await page.locator('.ring.chosen:visible').count(), 2);
     assert.deepEqual(troubles.filter((t) => !/WebGL/i.test(t)), []);
     await close();
   } finally {
@@ -377,6 +624,11 @@ test('three thousand poses stay below the limit, and more do too', async () => {
     const {sets: [set]} = dataOf('many.html');
     assert.equal(set.total, poses);
     assert.ok(set.count === 3000 || (poses > 3000 && set.count >= 1000), `${set.count}`);
+    for (const kind of ['size', 'x', 'turned']) {
+      for (const {counts} of [set.histogram(kind, 'both', false), set.histogram(kind, 'after', false)]) {
+        for (const list of Object.values(counts)) assert.equal(list.reduce((a, b) => a + b), poses);
+      }
+    }
     const {page, troubles, close} = await open(browser, at('many.html'), {width: 390});
     assert.ok((await picture(page)).near.before > 300);
     assert.equal(/of 12000 poses are drawn/.test(await page.innerText('main')), poses === 12000);

@@ -1,13 +1,36 @@
-/** The page's colours have one home, its style sheet: light, dark and paper. */
+const names = ['paper', 'ink', 'soft', 'grid', 'axis', 'before', 'after', 'floor', 'x', 'y', 'z'];
+const paper = matchMedia('print');
+let printing = false;
+
+/** Whether what is drawn now is for paper: before a page is printed the style sheet does not know it yet. */
+export const onPaper = () => printing || paper.matches;
+
+let light;
+/** The page's colours have one home, its style sheet: light, dark and paper, which is light in a dark room too. */
 export function colours() {
-  const style = getComputedStyle(document.documentElement);
-  const names = ['paper', 'ink', 'soft', 'grid', 'axis', 'before', 'after', 'floor', 'x', 'y', 'z'];
+  if (!light) {
+    light = document.createElement('div');
+    light.className = 'light';
+    light.hidden = true;
+    document.body.append(light);
+  }
+  const style = getComputedStyle(onPaper() ? light : document.documentElement);
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
-/** Calls when they change: another scheme, or paper. */
+/** Calls when the screen takes another scheme. */
+export function onScheme(changed) {
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
+}
+
+/** The same, and when the page goes to paper and comes back; what is called draws at once. */
 export function onColours(changed) {
-  for (const query of ['(prefers-color-scheme: dark)', 'print']) {
-    matchMedia(query).addEventListener('change', changed);
+  onScheme(changed);
+  paper.addEventListener('change', changed);
+  for (const [event, now] of [['beforeprint', true], ['afterprint', false]]) {
+    window.addEventListener(event, () => {
+      printing = now;
+      changed();
+    });
   }
 }

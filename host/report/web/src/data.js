@@ -18,10 +18,11 @@ class PoseSet {
     this.total = json.total;  // poses of the data; of very many only some are here
     this.q = scaled(json.q, (units.joint_unit_deg * Math.PI) / 180);
     this.count = this.q.length / 6;
-    this.before = scaled(json.before, units.error_unit_mm);
-    this.after = scaled(json.after, units.error_unit_mm);
-    this.turnedBefore = scaled(json.turned_before, units.angle_unit_deg);
-    this.turnedAfter = scaled(json.turned_after, units.angle_unit_deg);
+    this.before = scaled(json.before, json.before_unit_mm);
+    this.after = scaled(json.after, json.after_unit_mm);
+    this.turnedBefore = scaled(json.turned_before, json.before_unit_deg);
+    this.turnedAfter = scaled(json.turned_after, json.after_unit_deg);
+    this.histograms = json.histograms;
     this.floor = json.floor_mm;
     this.number = json.number ?? Array.from({length: this.count}, (_, k) => k + 1);
     this.line = json.line ?? (json.first_line === undefined ? [] : this.number.map((n) => json.first_line + n - 1));
@@ -51,6 +52,27 @@ class PoseSet {
   errorInBase(which, k) {
     const e = this.error(which, k);
     return this.turn ? this.turn.map((row) => row[0] * e[0] + row[1] * e[1] + row[2] * e[2]) : [...e];
+  }
+
+  /** Whether a linear axis would press before or after onto zero. */
+  startsLogarithmic(kind) {
+    return this.histograms[kind].starts_log;
+  }
+
+  /**
+   * How many of all poses, drawn or not, lie in which class: edges, one more than counts, and counts by name.
+   * \return nothing where a logarithmic axis has nothing to show
+   */
+  histogram(kind, which, log) {
+    const found = this.histograms[kind][log ? `${which}_log` : which];
+    if (!found) return null;
+    const {low, high, counts: [{length}]} = found;
+    return {
+      low, high,
+      edges: Array.from({length: length + 1}, (_, k) =>
+        (log ? low * (high / low) ** (k / length) : low + ((high - low) * k) / length)),
+      counts: which === 'both' ? {before: found.counts[0], after: found.counts[1]} : {[which]: found.counts[0]},
+    };
   }
 
   /** What is plotted of the errors: their size, a component, or the angle of the rotation error. */
@@ -100,8 +122,28 @@ export function roundUp(v) {
   return below >= v * (1 - 1e-9) ? below : roundDown(2.6 * below);
 }
 
-/** Three significant digits without an exponent, as the tables have it. */
+/** Three significant digits without an exponent, as the tables have it; never a nought for what is none. */
 export function shown(v) {
-  if (!(Math.abs(v) > 0)) return '0';
-  return v.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(Math.abs(v))), 0), 5));
+  const size = Math.abs(v);
+  if (!(size > 0)) return '0';
+  if (size < 5e-6) return '< 0.00001';
+  return v.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(size)), 0), 5));
+}
+
+/** A length with the unit in which it can be read. */
+export function lengthText(mm) {
+  const size = Math.abs(mm);
+  if (size === 0 || size >= 1e-3) return `${shown(mm)} mm`;
+  if (size >= 1e-6) return `${shown(mm * 1e3)} µm`;
+  return size >= 1e-9 ? `${shown(mm * 1e6)} nm` : '< 0.001 nm';
+}
+
+/** A number on an axis: powers of ten where noughts would be many. */
+export function tickText(v) {
+  if (v === null) return '';
+  const size = Math.abs(v);
+  if (size === 0 || (size >= 1e-4 && size < 1e6)) return String(Number(v.toPrecision(6)));
+  const [lead, power] = v.toExponential(5).split('e');
+  const raised = [...String(Number(power))].map((c) => '⁰¹²³⁴⁵⁶⁷⁸⁹'['0123456789'.indexOf(c)] ?? '⁻').join('');
+  return Number(lead) === 1 ? `10${raised}` : `${Number(lead)}·10${raised}`;
 }

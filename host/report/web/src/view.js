@@ -6,8 +6,8 @@ import {
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {mergeGeometries} from 'three/addons/utils/BufferGeometryUtils.js';
 import {chain, measuredPoint, placed, toolFrame} from './chain.js';
-import {colours, onColours} from './colours.js';
-import {jointsOf, norm, roundDown, shown} from './data.js';
+import {colours, onColours, onPaper} from './colours.js';
+import {jointsOf, lengthText, norm, roundDown} from './data.js';
 import {check, choice, element, select} from './elements.js';
 
 const up = new Vector3(0, 1, 0);  // what three's cylinders stand along
@@ -29,7 +29,7 @@ function arrowGeometry(corners) {
 }
 
 /** How many times as long an error of the usual size is well seen. */
-const lengthening = (usual, size) => Math.max(roundDown((0.2 * size) / Math.max(usual, 1e-9)), 1);
+const lengthening = (usual, size) => Math.max(roundDown((0.2 * size) / usual), 1);
 
 /** 1, 2, 5, 10 … from one to the other. */
 function steps(from, to) {
@@ -40,8 +40,10 @@ function steps(from, to) {
 
 /** The arm in 3-D: error vectors before and after, or a plan with its beams and bodies. */
 export class ArmView {
-  constructor(at, data) {
+  /** @param {(number: number, pose: number) => void} stands  told in which pose of which set the arm stands */
+  constructor(at, data, stands) {
     this.data = data;
+    this.stands = stands;
     this.arm = data.arm;
     // Shown one at a time.
     this.scenes = [
@@ -59,8 +61,11 @@ export class ArmView {
     this.scene.add(this.ambient, this.sun, this.sun.target);
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
-    canvas.setAttribute('role', 'img');
-    this.stage = element('div', {class: 'stage'}, canvas);
+    canvas.setAttribute('role', 'application');  // its keys are its own
+    canvas.setAttribute('aria-roledescription', 'picture that can be turned');
+    // Printed instead: what WebGL draws after a page was told that it is printed does not reach the paper.
+    this.copy = element('canvas', {class: 'copy', 'aria-hidden': 'true'});
+    this.stage = element('div', {class: 'stage'}, canvas, this.copy);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener('change', () => this.render());
     // A finger that moves up or down scrolls the page; a wheel does until the view was clicked.
@@ -70,10 +75,16 @@ export class ArmView {
     canvas.addEventListener('blur', () => { this.controls.enableZoom = false; });
     canvas.addEventListener('pointerdown', (event) => { this.pressed = [event.clientX, event.clientY]; });
     canvas.addEventListener('click', (event) => this.pick(event));
+    canvas.addEventListener('keydown', (event) => this.key(event));
+    // A driver may take everything back that was drawn; three makes it anew when it is asked to.
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.build();
+      this.renderNow();
+    });
     this.panel = element('div', {class: 'controls'});
     this.legend = element('ul', {class: 'legend'});
     this.words = element('p', {class: 'note scale'});
-    this.readout = element('p', {class: 'note readout'});
+    this.readout = element('p', {class: 'note readout', role: 'status'});
     at.replaceChildren(this.stage, this.legend, this.words, this.readout, this.panel);
     this.colours = colours();
     this.enter(this.scenes[0]);
@@ -82,6 +93,7 @@ export class ArmView {
       this.colours = colours();
       this.build();
       this.renderNow();
+      if (onPaper()) this.copyPicture();
     });
     this.resize();
   }
@@ -92,12 +104,15 @@ export class ArmView {
     const {set} = entered;
     this.points = Array.from({length: set.count}, (_, k) => vector(measuredPoint(this.arm, jointsOf(set, k), set.point)));
     const home = chain(this.arm, new Array(6).fill(0)).map((f) => norm(f.origin));
+    // What a plan does not need to measure again.
+    this.known = Array.from({length: set.known?.count ?? 0}, (_, k) => vector(measuredPoint(this.arm, jointsOf(set.known, k))));
     this.size = Math.max(...home, ...this.points.map((p) => p.length()), 0.1);
     if (!entered.plan) {
       // What is left is far shorter: alone it is drawn longer.
-      const [before, after] = ['before', 'after'].map((which) => this.usual(which));
-      this.fitting = {before: lengthening(before, this.size), after: lengthening(after, this.size)};
-      this.fitting.both = this.fitting.before;
+      const usual = ['before', 'after'].map((which) => this.usual(which));
+      const [before, after] = usual.map((v) => lengthening(v > 0 ? v : Math.max(...usual) || this.size, this.size));
+      // Together both must have room.
+      this.fitting = {before, after, both: Math.min(before, after)};
       const low = Math.min(this.fitting.before, this.fitting.after) / 20;
       this.lengths = steps(Math.max(low, 1), Math.max(this.fitting.before, this.fitting.after) * 20);
       this.fitLength();
@@ -105,6 +120,18 @@ export class ArmView {
     this.fillPanel();
     this.build();
     this.lookFrom([0.75, -1.1, 0.55]);
+    this.tell();
+  }
+
+  /** Says in which pose the arm stands. */
+  tell() {
+    this.stands(this.now.number, this.pose);
+  }
+
+  /** "200 times", for the slider and the words. */
+  timesText() {
+    const factor = this.lengths[this.length];
+    return factor === 1 ? 'as they are' : `${factor.toLocaleString('en')} times`;
   }
 
   /** Four of five errors are shorter, m. */
@@ -141,6 +168,7 @@ export class ArmView {
     if (!plan) {
       this.lengthSlider = element('input', {
         type: 'range', class: 'length', min: 0, max: this.lengths.length - 1, value: this.length,
+        'aria-valuetext': this.timesText(),
         oninput: (event) => { this.length = Number(event.target.value); this.build(); this.render(); },
       });
       parts.push(
@@ -180,6 +208,7 @@ export class ArmView {
     this.poseSlider.value = this.pose + 1;
     this.build();
     this.render();
+    this.tell();
   }
 
   material(ink, opacity = 1) {
@@ -314,6 +343,10 @@ export class ArmView {
     const matrix = new Matrix4();
     this.points.forEach((p, k) => dots.setMatrixAt(k, matrix.makeTranslation(p.x, p.y, p.z)));
     this.content.add(dots);
+    if (set.outlier.size > 0) {
+      const odd = this.material(c.ink);
+      for (const k of set.outlier) this.addBall(this.points[k], 0.009 * this.size, odd);
+    }
     for (const which of ['before', 'after']) {
       if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
       const material = this.material(c[which]);
@@ -351,6 +384,8 @@ export class ArmView {
       if (plan.known.count > 0) this.addLines(skeleton(plan.known), c.before, 0.35);
       const dots = this.material(c.after);
       for (const p of this.points) this.addBall(p, 0.012 * this.size, dots);
+      const before = this.material(c.before);
+      for (const p of this.known) this.addBall(p, 0.009 * this.size, before);
     }
     if (this.shown.bodies) {
       const glass = this.material(c.soft, 0.3);
@@ -373,7 +408,7 @@ export class ArmView {
   describe() {
     const {set, plan} = this.now;
     const item = (mark, text) => element('li', {}, element('span', {class: `mark ${mark}`}), ` ${text}`);
-    const mm = (metres) => `${shown(metres * 1e3)} mm`;
+    const mm = (metres) => lengthText(metres * 1e3);
     const list = [];
     if (plan) {
       list.push(item('after', 'planned poses'));
@@ -382,6 +417,7 @@ export class ArmView {
     } else {
       if (this.shown.errors !== 'after') list.push(item('before', `error before: ${set.beforeIs}`));
       if (this.shown.errors !== 'before') list.push(item('after', `error after: ${set.afterIs}`));
+      if (set.outlier.size > 0) list.push(item('plain', 'lies far from the rest'));
     }
     if (this.shown.bodies && (this.arm.capsules.length > 0 || (plan && set.obstacles.length > 0))) {
       list.push(item('body', 'glass: bodies that must not touch or stand in a beam'));
@@ -394,22 +430,65 @@ export class ArmView {
       this.words.textContent = `${squares}. The arm with its bodies stands in the pose chosen below; the others are lines.`;
     } else {
       const factor = this.lengths[this.length];
-      this.words.textContent = `Errors are drawn ${factor.toLocaleString('en')} times as long as they are. ${squares}, `
-        + `${mm(this.square / factor)} of error. The arm is the nominal one.`
+      const times = this.timesText();
+      this.lengthSlider.setAttribute('aria-valuetext', times);
+      this.words.textContent = `Errors are drawn ${factor === 1 ? 'as long' : `${times} as long`} as they are. ${squares}, `
+        + `${mm(this.square / factor)} of error. ${this.tooShort()}The arm is the nominal one.`
         + (set.count < set.total ? ` ${set.count} of ${set.total} poses are drawn.` : '');
     }
+    this.poseSlider.setAttribute('aria-valuetext', `pose ${plan ? this.pose + 1 : set.number[this.pose]}`);
     const q = Array.from(jointsOf(set, this.pose), (v, j) => `q${j + 1} ${(Math.round((v * 1800) / Math.PI) / 10 + 0).toFixed(1)}°`).join(', ');
     const said = [element('b', {}, `Pose ${plan ? this.pose + 1 : set.number[this.pose]}`), ` of ${plan ? set.count : set.total}`];
     if (plan) {
       if (set.payload.length > 0) said.push(`, with ${set.payload[this.pose]} kg`);
     } else {
       if (set.line.length > 0) said.push(` (line ${set.line[this.pose]})`);
-      said.push(`: ${shown(norm(set.error('before', this.pose)))} mm before, ${shown(norm(set.error('after', this.pose)))} mm after`);
+      said.push(`: ${lengthText(norm(set.error('before', this.pose)))} before, ${lengthText(norm(set.error('after', this.pose)))} after`);
     }
     this.readout.replaceChildren(...said, `; ${q}`);
     this.renderer.domElement.setAttribute('aria-label', plan
       ? `The arm in pose ${this.pose + 1} of ${set.count} of the plan, with bodies and beams`
-      : `The arm with the position errors of ${set.count} poses as arrows, ${this.words.textContent}`);
+      : `The arm with the position errors of ${set.count} pose${set.count === 1 ? '' : 's'} as arrows. ${this.words.textContent} `
+        + 'Arrow keys turn it, + and − come nearer and go farther.');
+  }
+
+  /** A sentence on errors that are shown and yet cannot be seen. */
+  tooShort() {
+    const {set} = this.now;
+    const words = [];
+    for (const which of ['before', 'after']) {
+      if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
+      if (!set[which].some((v) => v !== 0)) {
+        words.push(`There are no errors ${which}. `);
+      } else if (this.usual(which) * this.lengths[this.length] < 0.01 * this.size) {
+        words.push(`The errors ${which} are too short to be seen at this length`
+          + `${onPaper() || this.shown.errors === which ? '' : `: choose “${which}”`}. `);
+      }
+    }
+    return words.join('');
+  }
+
+  key(event) {
+    const step = Math.PI / 18;
+    const turns = {ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step]}[event.key];
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (turns) this.turn(...turns);
+    else if (event.key === '+' || event.key === '=') this.approach(0.8);
+    else if (event.key === '-') this.approach(1.25);
+    else return;
+    event.preventDefault();
+  }
+
+  /** Around the upright axis, and up or down, rad. */
+  turn(around, down) {
+    const from = this.camera.position.clone().sub(this.controls.target);
+    const distance = from.length();
+    const angle = Math.atan2(from.y, from.x) + around;
+    const steep = Math.min(Math.max(Math.acos(from.z / distance) + down, 0.02), Math.PI - 0.02);
+    this.camera.position.set(Math.sin(steep) * Math.cos(angle), Math.sin(steep) * Math.sin(angle), Math.cos(steep))
+      .multiplyScalar(distance).add(this.controls.target);
+    this.controls.update();
+    this.render();
   }
 
   /** A click, not the end of a turn: the nearest measured point. */
@@ -430,8 +509,30 @@ export class ArmView {
   /** Turns the view and comes as near as still shows all points, the arm, and the instrument. */
   lookFrom(from) {
     const {set, plan} = this.now;
-    const places = [new Vector3(), ...this.points, ...chain(this.arm, jointsOf(set, this.pose)).map((f) => vector(f.origin))];
+    const frames = chain(this.arm, jointsOf(set, this.pose));
+    const places = [new Vector3(), ...this.points, ...this.known, ...frames.map((f) => vector(f.origin)),
+      ...[[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => vector(axis).multiplyScalar(0.2 * this.size))];
     if (plan && set.tracker) places.push(vector(set.tracker));
+    if (this.shown.bodies) {
+      for (const body of this.arm.capsules.filter((c) => c.radius <= 0.5 * this.size)) {
+        for (const end of [body.from, body.to]) {
+          const at = vector(placed(frames[body.frame] ?? frames[0], end));
+          for (const d of [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]) {
+            places.push(vector(d).multiplyScalar(body.radius).add(at));
+          }
+        }
+      }
+    }
+    for (const which of plan ? [] : ['before', 'after']) {
+      if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
+      const factor = this.lengths[this.length] * 1e-3;
+      // One that is far longer than the others may leave the picture, or nothing else were seen.
+      this.points.forEach((p, k) => places.push(
+        vector(set.errorInBase(which, k)).multiplyScalar(factor).clampLength(0, 0.6 * this.size).add(p)));
+    }
+    for (let k = 0; k < (plan ? set.known.count : 0); ++k) {
+      places.push(...chain(this.arm, jointsOf(set.known, k)).map((f) => vector(f.origin)));
+    }
     const towards = vector(from).normalize();
     this.camera.position.copy(towards);
     this.camera.lookAt(0, 0, 0);
@@ -480,6 +581,13 @@ export class ArmView {
     this.camera.updateProjectionMatrix();
     if (first) this.lookFrom(this.from);
     this.renderNow();
+  }
+
+  copyPicture() {
+    const {domElement: from} = this.renderer;
+    this.copy.width = from.width;
+    this.copy.height = from.height;
+    this.copy.getContext('2d').drawImage(from, 0, 0);
   }
 
   render() {
