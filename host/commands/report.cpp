@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <memory>
@@ -147,7 +148,15 @@ PageResult result_of(const std::string& text) {
 }
 
 void Report::run() const {
-  refuse_same_file({{"--robot", robot}, {"--calibration", calibration}}, {{"-o", out}});
+  std::vector<NamedFile> read{{"--robot", robot}, {"--calibration", calibration}};
+  for (const std::string& text : errors) {
+    const std::string files = pair_of(text, errors_form).second;
+    const auto comma = std::min(files.find(','), files.size());
+    read.push_back({"--errors", files.substr(0, comma)});
+    read.push_back({"--errors", files.substr(std::min(comma + 1, files.size()))});
+  }
+  for (const std::string& text : results) read.push_back({"--result", pair_of(text, result_form).second});
+  refuse_same_file(read, {{"-o", out}, {"--json", common.json}});
   const RobotFile robot_file = load_robot(robot);
   Page page;
   page.arm = robot_file;
@@ -161,14 +170,19 @@ void Report::run() const {
   for (const std::string& text : results) page.results.push_back(result_of(text));
   for (const std::string& text : links) {
     const auto [href, name] = pair_of(text, link_form);
+    if (!is_local(href))
+      throw InputError("command line", 0, "--link", "a page beside this one, as other.html",
+                       "'" + href + "'");
     page.links.push_back({href, name});
   }
   if (!calibration.empty()) add_parameters(page, load_calibration(calibration, robot_file), robot_file);
   Calibration now;
   stamp(now, robot_file);
   page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
-  write_file(out, html(page));
+  const std::string text = html(page);
+  write_file(out, text);
   common.say(out + ": written");
+  common.write_json({{"page", out}, {"bytes", text.size()}});
 }
 
 }  // namespace

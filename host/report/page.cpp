@@ -449,15 +449,6 @@ std::string plan_section(const PagePlan& plan) {
   return out + table({"parameter", "±", "unit"}, rows, " class=\"parameters\"") + "</section>\n";
 }
 
-/// Only places beside this page or inside it: a report never leads into the network. Browsers take a backslash for a
-/// slash, and leave control characters and a blank at the start out before they look.
-bool is_local(const std::string& href) {
-  return !href.empty() && href[0] != '/' && href[0] != ' ' &&
-         std::none_of(href.begin(), href.end(), [](char c) {
-           return c == ':' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
-         });
-}
-
 /// What is wrong with a result that the numbers themselves say.
 std::vector<std::string> doubts_of(const Page& page) {
   std::vector<std::string> doubts = page.doubts;
@@ -494,6 +485,14 @@ constexpr const char* closed =
     "script-src 'unsafe-inline'\">\n";
 
 }  // namespace
+
+// Browsers take a backslash for a slash, and leave control characters and a blank at the start out before they look.
+bool is_local(const std::string& href) {
+  return !href.empty() && href[0] != '/' && href[0] != ' ' &&
+         std::none_of(href.begin(), href.end(), [](char c) {
+           return c == ':' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
+         });
+}
 
 bool has_web_parts() { return !web_script().empty(); }
 

@@ -91,6 +91,9 @@ struct PageLink {
   std::string text;
 };
 
+/// Only places beside a page or inside it: a report never leads into the network, and leaves other links out.
+bool is_local(const std::string& href);
+
 /// A plan of measurement poses.
 struct PagePlan {
   std::vector<std::pair<double, double>> progress;  ///< evaluations and criterion at each improvement

@@ -16,7 +16,7 @@ namespace {
 
 // In units of the drawing: about a pixel on a phone.
 constexpr double width = 360, usual_height = 220;
-constexpr double least_left = 46, most_left = 166, least_right = 12, top = 12, bottom = 36;
+constexpr double least_left_margin = 46, most_left = 166, least_right = 12, top = 12, bottom = 36;
 constexpr double letter = 6.7, line_height = 13;  // of the page's 11 px text, in the wider of the usual fonts
 constexpr double legend_sample = 20, legend_gap = 14;
 // A logarithmic axis where one number is this many times another: else the smaller ones lie on the axis.
@@ -237,7 +237,7 @@ class Plot {
     const std::vector<Tick> up = ticks_of(y, tall, false);
     double longest = 0;
     for (const Tick& t : up) longest = std::max(longest, text_width(t.text));
-    left_ = std::clamp(longest + (y.name.empty() ? 7 : 25), least_left, most_left);
+    left_ = std::clamp(longest + (y.name.empty() ? 7 : 25), least_left_margin, most_left);
     const std::vector<Tick> along = ticks_of(x, width - left_ - least_right, true);
     right_ = least_right;
     for (const Tick& t : along) {
@@ -292,7 +292,7 @@ class Plot {
   std::string done() { return svg_ + "</svg>\n"; }
 
  private:
-  double left_ = least_left, right_ = least_right, top_ = top, height_ = usual_height;
+  double left_ = least_left_margin, right_ = least_right, top_ = top, height_ = usual_height;
   std::string svg_;
 };
 
