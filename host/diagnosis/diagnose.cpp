@@ -416,7 +416,8 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
         fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
                     refit.fit.newton_decrement));
   if (out.degrees_of_freedom_after < 1)
-    out.doubts.push_back("there are as many unknowns as measured numbers: no effect could show in what is left");
+    out.doubts.push_back(
+        "there are as many unknowns as measured numbers: no effect could show in what is left");
   const bool changed = !found.pieces.empty();
   if (changed && !(out.chi2_per_dof_after <= out.chi2_per_dof_before * 1.0001) &&
       !(out.error_after.rms_m < out.error_before.rms_m))
