@@ -407,7 +407,7 @@ test('by keyboard and to those who listen', async () => {
     await page.keyboard.press('ArrowRight');
     values.push(Number((await page.textContent('.explore .readout')).match(/^Pose \d+ .*q1 \[deg\] (-?[\d.]+)/)[1]));
   }
-  assert.deepEqual(values, values.toSorted((a, b) => a - b));
+  assert.deepEqual(values, [...values].sort((a, b) => a - b));
   assert.equal(await rings('found'), 2);
   const number = (await page.textContent('.explore .readout')).match(/^Pose (\d+)/)[1];
   await page.keyboard.press('Enter');
