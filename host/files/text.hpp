@@ -21,6 +21,9 @@ std::string_view trimmed(std::string_view text);
 /// ASCII letters in lower case; other bytes as they are.
 std::string lower(std::string_view text);
 
+/// Where the > of a tag of XML stands, looked for from `at` on and not within quotes; npos where there is none.
+std::size_t tag_close(std::string_view text, std::size_t at);
+
 }  // namespace flexcomp::host
 
 #endif

@@ -49,17 +49,7 @@ std::vector<Tag> tags_of(std::string_view text) {
     std::size_t k = at + 1;
     while (k < text.size() && std::string_view(" \t\r\n/>").find(text[k]) == std::string_view::npos)
       tag.name += text[k++];
-    char quote = 0;
-    for (; k < text.size(); ++k) {
-      const char c = text[k];
-      if (quote != 0) {
-        if (c == quote) quote = 0;
-      } else if (c == '"' || c == '\'') {
-        quote = c;
-      } else if (c == '>') {
-        break;
-      }
-    }
+    k = std::min(tag_close(text, k), text.size());
     tag.closed = k > at && text[k - 1] == '/';
     tag.end = std::min(k + 1, text.size());
     if (!tag.closed) ++depth;

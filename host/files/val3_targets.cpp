@@ -80,18 +80,9 @@ class Val3 : public ProgramText {
 
   /// Behind its >, which may stand in quotes before.
   std::size_t end_of_tag(std::size_t at) const {
-    char quote = 0;
-    for (std::size_t k = at + 1; k < text_.size(); ++k) {
-      const char c = text_[k];
-      if (quote != 0) {
-        if (c == quote) quote = 0;
-      } else if (c == '"' || c == '\'') {
-        quote = c;
-      } else if (c == '>') {
-        return k + 1;
-      }
-    }
-    throw error(at, "", "a tag that ends with >", "none");
+    const std::size_t close = tag_close(text_, at + 1);
+    if (close == std::string_view::npos) throw error(at, "", "a tag that ends with >", "none");
+    return close + 1;
   }
 
   void target(std::size_t at, const std::string& name, const std::map<std::string, TextSpan>& a) {
