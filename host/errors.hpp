@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The ways in which the calibrator gives up, and the exit status of each (main.cpp maps them, nobody else).
 #ifndef FLEXCOMP_HOST_ERRORS_HPP
@@ -5,7 +6,7 @@
 
 #include <stdexcept>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 

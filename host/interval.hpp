@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A range of values that holds the true one with a probability.
 #ifndef FLEXCOMP_HOST_INTERVAL_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The command `flexcomp`: one subcommand per file of commands/, and the one place that turns what was thrown into an
 /// exit status.

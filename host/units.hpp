@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The units that files for people use, and the one way from text to SI and back. Inside everything is SI.
 #ifndef FLEXCOMP_HOST_UNITS_HPP

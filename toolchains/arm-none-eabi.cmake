@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What the three Cortex targets share. Included by them after they have set
 #   FLEXCOMP_CPU_FLAGS   which core and floating-point unit
 #   FLEXCOMP_BOARD       the folder in firmware/boards that starts an image

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Cortex-R5F with a double-precision unit, in double. Thumb: the library is a quarter smaller than in ARM state.
 # CPU, memory and semihosting, no peripherals.
 set(FLEXCOMP_CPU_FLAGS "-mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -mthumb")

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What canopen_controller.c asks of a board: a clock, a control period and a CAN controller. Nothing here waits:
  * every function returns at once, whatever the hardware does. Bind it to your own drivers, or see
  * firmware/boards/xlnx-zcu102-r5/ for one that is there. */

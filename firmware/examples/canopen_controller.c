@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A controller with flexcomp in it, as a CANopen node: the smallest complete program. It corrects the joint
  * commands of a Staubli TX60L a thousand times a second and takes new parameter sets over CAN meanwhile.
  *

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The core alone, in C++17: headers, no library to link, no heap, no exceptions. From the bytes of a parameter set to a
 // corrected joint command, in double or (FLEXCOMP_SCALAR=float) in float. Ends with 0 where the command is the one that the host
 // computes.

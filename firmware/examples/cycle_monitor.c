@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "cycle_monitor.h"
 
 /* What a cycle was: without a set, with one, fading from one to the next, fading out to none. Kept apart are those

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The smallest controller: one arm, two slots, a control cycle. C90 with <stdint.h>, no operating system, no output.
  *
  * It starts with a parameter set that lies in its non-volatile memory already (here: RAM, filled as a programmer would

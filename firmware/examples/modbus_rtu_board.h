@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What modbus_rtu_controller.c asks of a board: a clock, a control cycle, two serial lines, memory that keeps two slots.
  * Bind it to your own drivers, or see firmware/boards/mps2-an500/ for one that is there. */
 #ifndef FLEXCOMP_EXAMPLES_MODBUS_RTU_BOARD_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A whole controller in one file: the control cycle corrects joint commands in a timer interrupt, the background
  * serves Modbus RTU and the parameter store in what time is left. Plain C; what is particular to a board is
  * behind modbus_rtu_board.h, what measures the cycle is in cycle_monitor.h. */

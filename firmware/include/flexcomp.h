@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* flexcomp for C controllers (C99; C90 with <stdint.h>).
  *
  * The controller's control cycle gives a joint command and gets back the command that brings the real,

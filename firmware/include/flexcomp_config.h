@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What is fixed when the library is built; C and C++. Whoever includes it must see the values with which the
  * library was compiled, so set them for the whole build, not beside one include. */
 #ifndef FLEXCOMP_CONFIG_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "flexcomp_firmware/arithmetic.hpp"
 
 #include "flexcomp/image.hpp"
@@ -18,7 +19,7 @@ Miss missed(const FirmwareModel& model, const Joints& q_rad, const Joints& q_com
   const Pose<Scalar> nominal = nominal_forward(model, q_command_rad);
   const Pose<Scalar> flexible = forward(model, q_rad, context, workspace);
   const Vector3<Scalar> p = nominal.position - flexible.position;
-  Triple<Scalar> r;
+  Vec3<Scalar> r;
   detail::rotation_error(columns_of(nominal.rotation), columns_of(flexible.rotation), r);
   const Scalar trace = dot<Scalar>(nominal.rotation.col(0), flexible.rotation.col(0)) +
                        dot<Scalar>(nominal.rotation.col(1), flexible.rotation.col(1)) +

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "flexcomp_firmware/control.hpp"
 
 #include <cstring>
@@ -142,7 +143,8 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
     fade_left_ = 0;
   } else {
     if (changed || source != source_) {
-      for (std::size_t j = 0; j < joints; ++j) kept_[j] = correction_[j] - (out.q[j] - q_command_rad[j]);
+      for (std::size_t j = 0; j < joints; ++j)
+        fade_offset_[j] = correction_[j] - (out.q[j] - q_command_rad[j]);
       fade_left_ = settings_.fade_cycles;
     }
     if (fade_left_ != 0) {
@@ -153,7 +155,7 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
         const Scalar largest = settings_.compensation.largest_correction_rad;
         const Scalar least = q_command_rad[j] - largest;
         const Scalar most = q_command_rad[j] + largest;
-        Scalar q = out.q[j] + kept_[j] * weight;
+        Scalar q = out.q[j] + fade_offset_[j] * weight;
         if (q < least || q > most) {
           q = q < least ? least : most;
           if (source == Source::set && out.status != StepStatus::at_limit) out.status = StepStatus::limited;

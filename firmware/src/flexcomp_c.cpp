@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The C interface: every object is built in the caller's memory, nothing else happens here.
 #include <cstddef>
 #include <cstdint>

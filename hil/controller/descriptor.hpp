@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A file descriptor that is closed when its owner goes.
 #ifndef FLEXCOMP_HIL_CONTROLLER_DESCRIPTOR_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // flexcomp-controller: the firmware library as a Linux process. A thread of its own runs the control cycle,
 // as the timer interrupt of a controller would; the main thread serves the buses and the parameter store.
 #include <signal.h>
@@ -159,7 +160,7 @@ void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atom
 }
 
 int serve(const Options& options) {
-  const host::RobotFile robot = host::load_robot(options.robot);
+  const host::Robot robot = host::load_robot(options.robot);
   hil::SlotFile slots(options.store);
 
   firmware::DeviceSettings settings;

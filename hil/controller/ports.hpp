@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The buses of the process: what stands between the firmware's servers and the sockets and devices of
 /// Linux. Each port is asked for the descriptors that it waits on and then serves what has come; none of them

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "slot_file.hpp"
 
 #include <fcntl.h>
@@ -8,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::hil {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Non-volatile memory as a file: two slots one after the other, erased bytes 0xFF, every write on the
 /// disk before it counts as done. Each byte is written once between two erases, as on flash.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The plant's own reading of robot, truth and CSV files. Strict where something would be misread in silence.
 #ifndef FLEXCOMP_PLANT_FILES_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// `flexcomp-plant`: plays the true robot in a closed loop. It knows the hidden errors, gives what an instrument would
 /// see, and says where the arm really goes. Shares no code with the core or the calibrator.

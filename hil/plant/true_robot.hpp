@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The robot as it really is, hidden from the calibrator: nominal chain, true errors and where the arm goes with them.
 /// Written from the words of the model (docs of this project, Chen et al. 2019) on KDL's frames; it shares no code with

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 // Loaded in front of user-mode Linux by hil/with-vcan.
 //
 // Linux takes a process's extended registers only in full (PTRACE_SETREGSET, NT_X86_XSTATE: "count != size" is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// How a controller is named on the command line: which bus, where on it, and as whom.
 ///

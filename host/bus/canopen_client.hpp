@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A controller on CANopen, through SocketCAN (flexcomp/wire/canopen_objects.hpp).
 #ifndef FLEXCOMP_HOST_BUS_CANOPEN_CLIENT_HPP

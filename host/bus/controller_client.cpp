@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bus/controller_client.hpp"
 
 #include <fmt/format.h>
@@ -116,7 +117,7 @@ wire::Status ControllerClient::status() {
   return out;
 }
 
-std::optional<RobotFile> ControllerClient::robot() {
+std::optional<Robot> ControllerClient::robot() {
   Bytes bytes;
   try {
     bytes = read_record(Record::robot, wire::robot_record_bytes);
@@ -124,7 +125,7 @@ std::optional<RobotFile> ControllerClient::robot() {
     if (no.no_such_object) return std::nullopt;
     explain("read which robot it is for", no);
   }
-  RobotFile out;
+  Robot out;
   std::array<char, wire::robot_name_bytes> name{};
   const std::size_t size = wire::decode(bytes.data(), byte_order(), out.nominal, name.data());
   out.path = fmt::format("the controller at {}", where_);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A controller as seen over a bus: the same conversation on Modbus and CANopen (flexcomp/wire/store_state.hpp).
 #ifndef FLEXCOMP_HOST_BUS_CONTROLLER_CLIENT_HPP
@@ -15,9 +16,9 @@
 
 #include "bus/bus_address.hpp"
 #include "errors.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp/wire/store_state.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -68,7 +69,7 @@ class ControllerClient {
 
   /// The arm that the controller was built for, checked against its hashes; nothing where it does not tell. Its name
   /// is empty where the controller knows only the hash.
-  std::optional<RobotFile> robot();
+  std::optional<Robot> robot();
 
   /// Announces an image and sends its bytes. The active set stays as it is.
   void stage(std::span<const std::uint8_t> image, const Progress& progress = {});

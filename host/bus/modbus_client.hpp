@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A controller on Modbus TCP or RTU, by libmodbus (flexcomp/wire/modbus_map.hpp).
 #ifndef FLEXCOMP_HOST_BUS_MODBUS_CLIENT_HPP

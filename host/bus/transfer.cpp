@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bus/transfer.hpp"
 
 #include <fmt/format.h>
@@ -10,9 +11,10 @@
 #include <set>
 #include <system_error>
 
-#include "files/input_error.hpp"
+#include "files/robot_file.hpp"
 #include "files/yaml_field.hpp"
 #include "flexcomp/image.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -110,9 +112,9 @@ void push_image(ControllerClient& client, std::span<const std::uint8_t> image, c
   }
 }
 
-RobotFile robot_of(ControllerClient& client, const std::string& robot_path) {
+Robot robot_of(ControllerClient& client, const std::string& robot_path) {
   if (robot_path.empty()) {
-    std::optional<RobotFile> told = client.robot();
+    std::optional<Robot> told = client.robot();
     if (!told) {
       throw BusError(
           fmt::format("{}: this controller does not tell which robot it is for: give its file with --robot",
@@ -120,7 +122,7 @@ RobotFile robot_of(ControllerClient& client, const std::string& robot_path) {
     }
     return *std::move(told);
   }
-  RobotFile robot = load_robot(robot_path);
+  Robot robot = load_robot(robot_path);
   const wire::Capability& there = client.capability();
   if (robot.nominal.name_hash != there.name_hash) {
     throw BusError(fmt::format("{}: the controller is for another robot than '{}' ({})", client.where(),
@@ -134,10 +136,10 @@ RobotFile robot_of(ControllerClient& client, const std::string& robot_path) {
   return robot;
 }
 
-Calibration load_calibration_for(ControllerClient& client, const std::string& path, const RobotFile& robot) {
+Calibration load_calibration_for(ControllerClient& client, const std::string& path, const Robot& robot) {
   const wire::Capability& there = client.capability();
   const YamlField root = YamlField::load(path);
-  RobotFile known = robot;
+  Robot known = robot;
   if (const auto field = root.find("robot")) {
     const std::string name = field->text();
     if (name_hash(name.data(), name.size()) != there.name_hash) {

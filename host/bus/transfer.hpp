@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A parameter set on its way into a controller and out of it.
 #ifndef FLEXCOMP_HOST_BUS_TRANSFER_HPP
@@ -11,8 +12,8 @@
 
 #include "bus/controller_client.hpp"
 #include "files/calibration_file.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/wire/store_state.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -36,11 +37,11 @@ void push_image(ControllerClient& client, std::span<const std::uint8_t> image,
 
 /// The robot that a set is made for or read for: of a file where one is given (it must be the controller's), else as
 /// the controller tells it. \throws BusError where it is another one, or where neither says
-RobotFile robot_of(ControllerClient& client, const std::string& robot_path);
+Robot robot_of(ControllerClient& client, const std::string& robot_path);
 
 /// Reads a calibration that is meant for this controller. \throws BusError where the file names another robot or
 /// geometry than the controller's, InputError as load_calibration()
-Calibration load_calibration_for(ControllerClient& client, const std::string& path, const RobotFile& robot);
+Calibration load_calibration_for(ControllerClient& client, const std::string& path, const Robot& robot);
 
 /// The active set. \throws BusError where there is none or its bytes are damaged
 Bytes pull_image(ControllerClient& client, const Progress& progress = {});

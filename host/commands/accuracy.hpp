@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Errors before and after, as `identify` and `validate` both say them: to people and to machines.
 #ifndef FLEXCOMP_HOST_COMMANDS_ACCURACY_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What is answered to targets, by the host (compensate) or by the controller (probe): one file format for both.
 #ifndef FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP

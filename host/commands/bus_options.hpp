@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Options that the commands which talk to a controller have in common.
 #ifndef FLEXCOMP_HOST_COMMANDS_BUS_OPTIONS_HPP

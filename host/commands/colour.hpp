@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Colour on a terminal, and nothing but the text anywhere else: in a pipe, in a file, where NO_COLOR is set
 /// (no-color.org) or the terminal is a dumb one.

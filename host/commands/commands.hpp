@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The commands of `flexcomp`. Each lives in commands/NAME.cpp and adds itself as a subcommand whose callback does the
 /// work; what goes wrong is thrown (errors.hpp) and becomes an exit status in main.cpp.

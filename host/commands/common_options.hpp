@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Options that every command has, and the two ways in which a command speaks: text for people, JSON for machines.
 #ifndef FLEXCOMP_HOST_COMMANDS_COMMON_OPTIONS_HPP
@@ -10,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/data_file.hpp"
+#include "measurement/measured_data.hpp"
+#include "model/effects.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "flexcomp/compensate.hpp"
 
 #include <fmt/format.h>
@@ -19,18 +20,19 @@
 #include "commands/numbers.hpp"
 #include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
+#include "exchange/arm_sides.hpp"
+#include "exchange/target_program.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
-#include "files/image.hpp"
-#include "files/input_error.hpp"
-#include "files/quaternion.hpp"
-#include "files/target_program.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "flexcomp/image.hpp"
 #include "flexcomp/model.hpp"
-#include "kinematics/arm_sides.hpp"
+#include "input_error.hpp"
 #include "kinematics/nominal_inverse.hpp"
+#include "model/parameter_image.hpp"
+#include "quaternion.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -51,8 +53,8 @@ struct Compensate {
   void run() const;
 
  private:
-  TargetsFile from_program(const TargetProgram& program, const RobotFile& robot_file) const;
-  std::string to_program(const TargetProgram& program, const RobotFile& robot_file,
+  TargetsFile from_program(const TargetProgram& program, const Robot& robot_file) const;
+  std::string to_program(const TargetProgram& program, const Robot& robot_file,
                          const std::vector<Answer>& answers) const;
   Pose<double> program_frame() const;
 };
@@ -69,7 +71,7 @@ Pose<double> Compensate::program_frame() const {
 
 /// The program's targets as joint commands. A pose is taken on the branch that its words name; where several remain, on
 /// the one that is nearest to the command before.
-TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFile& robot_file) const {
+TargetsFile Compensate::from_program(const TargetProgram& program, const Robot& robot_file) const {
   TargetsFile list;
   list.path = targets;
   list.warnings = program.warnings;
@@ -137,7 +139,7 @@ TargetsFile Compensate::from_program(const TargetProgram& program, const RobotFi
 }
 
 /// A corrected pose is the one that brings the robot's own nominal kinematics to the corrected joints.
-std::string Compensate::to_program(const TargetProgram& program, const RobotFile& robot_file,
+std::string Compensate::to_program(const TargetProgram& program, const Robot& robot_file,
                                    const std::vector<Answer>& answers) const {
   Model<double, joint_count, Capacity<1, 1, 6>> nominal;
   nominal.begin(robot_file.nominal);
@@ -160,7 +162,7 @@ std::string Compensate::to_program(const TargetProgram& program, const RobotFile
 void Compensate::run() const {
   refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--targets", targets}},
                    {{"-o", out}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   const Calibration set = load_calibration(calibration, robot_file);
   std::optional<ProgramLanguage> language = program_language(targets);
   if (!format.empty()) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/diagnose.hpp"
 #include "commands/outputs.hpp"
 
@@ -16,8 +17,11 @@
 #include "commands/diagnosis_json.hpp"
 #include "commands/progress_bar.hpp"
 #include "diagnosis/held_out.hpp"
-#include "diagnosis/words.hpp"
+#include "diagnosis/messages.hpp"
 #include "errors.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "report/results.hpp"
 
@@ -36,14 +40,14 @@ struct Diagnose {
   bool force = false;
 
   void run() const;
-  void say_effects(const Diagnosis& d, const RobotFile& robot_file) const;
+  void say_effects(const Diagnosis& d, const Robot& robot_file) const;
   void say_gap(const Diagnosis& d, const std::optional<HeldOut>& others) const;
-  bool write_plan(const Diagnosis& d, const RobotFile& robot_file) const;
+  bool write_plan(const Diagnosis& d, const Robot& robot_file) const;
 };
 
 std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
 
-void Diagnose::say_effects(const Diagnosis& d, const RobotFile& robot_file) const {
+void Diagnose::say_effects(const Diagnosis& d, const Robot& robot_file) const {
   if (!d.effects.empty()) {
     common.say(fmt::format("  {:<40} {:>12} {:>9} {:>8} {:>10}  {}", "effect", "largest mm", "rms mm", "p",
                            "delta BIC", "to the controller"));
@@ -83,11 +87,11 @@ void Diagnose::say_gap(const Diagnosis& d, const std::optional<HeldOut>& others)
 }
 
 /// \return whether there was anything to tell apart
-bool Diagnose::write_plan(const Diagnosis& d, const RobotFile& robot_file) const {
-  if (d.telling_poses.empty()) return false;
-  DataFile poses;
+bool Diagnose::write_plan(const Diagnosis& d, const Robot& robot_file) const {
+  if (d.discriminating_poses.empty()) return false;
+  MeasuredData poses;
   poses.columns.payload_mass = true;
-  for (const CuringPose& p : d.telling_poses) {
+  for (const SuggestedPose& p : d.discriminating_poses) {
     Measurement row;
     row.context = default_context<double>(robot_file.nominal);
     row.q_rad = p.q_rad;
@@ -102,15 +106,15 @@ void Diagnose::run() const {
   refuse_same_file(
       {{"--robot", robot}, {"--calibration", calibration}, {"--data", data}, {"--holdout", holdout}},
       {{"-o", out}, {"--plan", plan}, {"--report", report}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   DiagnoseOptions options;
   if (!calibration.empty()) options.start = load_calibration(calibration, robot_file);
-  const DataFile file = load_data(data, robot_file, {force});
+  const MeasuredData file = load_data(data, robot_file, {force});
   std::vector<std::string> warnings = file.warnings;
   const std::vector<Observation> rows = observe(file, robot_file, &warnings);
   std::vector<Observation> other_rows;
   if (!holdout.empty()) {
-    const DataFile other = load_data(holdout, robot_file, {force});
+    const MeasuredData other = load_data(holdout, robot_file, {force});
     refuse_the_fitted(file, other);
     warnings.insert(warnings.end(), other.warnings.begin(), other.warnings.end());
     other_rows = observe(other, robot_file, &warnings);
@@ -148,7 +152,7 @@ void Diagnose::run() const {
   for (const std::string& note : d.notes) common.say("  note: " + note);
   common.say(fmt::format("{}: written", out));
   if (planned)
-    common.say(fmt::format("{}: {} poses that tell the rivals apart", plan, d.telling_poses.size()));
+    common.say(fmt::format("{}: {} poses that tell the rivals apart", plan, d.discriminating_poses.size()));
   if (!plan.empty() && !planned) {
     common.say(fmt::format("{}: not written: {}", plan,
                            d.effects.empty() ? "nothing was found that could go by another name"

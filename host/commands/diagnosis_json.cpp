@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "commands/diagnosis_json.hpp"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "diagnosis/words.hpp"
+#include "diagnosis/messages.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -102,7 +103,7 @@ Json places_json(const std::vector<PlaceShare>& places) {
 }  // namespace
 
 Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std::optional<HeldOut>& holdout,
-             const RobotFile& robot) {
+             const Robot& robot) {
   Json j{{"verdict", word(d.verdict)}, {"effects", Json::array()}, {"not_testable", Json::array()}};
   for (const FoundEffect& e : d.effects) j["effects"].push_back(effect_json(e));
   for (const NotTestable& n : d.not_testable)
@@ -130,7 +131,7 @@ Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std
   for (const EffectId& id : d.dropped) j["dropped"].push_back(name(id));
   j["telling_deg"] = Json::array();
   j["telling_payload_kg"] = Json::array();
-  for (const CuringPose& p : d.telling_poses) {
+  for (const SuggestedPose& p : d.discriminating_poses) {
     Json pose = Json::array();
     for (const double q : p.q_rad) pose.push_back(degrees(q));
     j["telling_deg"].push_back(pose);

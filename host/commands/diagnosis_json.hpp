@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A diagnosis for machines: the keys of contract.md, and more beside them.
 #ifndef FLEXCOMP_HOST_COMMANDS_DIAGNOSIS_JSON_HPP
@@ -14,7 +15,7 @@ namespace flexcomp::host {
 
 /// \param rows  those that were diagnosed: outliers are given by their lines
 nlohmann::ordered_json to_json(const Diagnosis& d, const std::vector<Observation>& rows,
-                               const std::optional<HeldOut>& holdout, const RobotFile& robot);
+                               const std::optional<HeldOut>& holdout, const Robot& robot);
 
 }  // namespace flexcomp::host
 

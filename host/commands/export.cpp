@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <cstddef>
@@ -6,16 +7,16 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "bus/bus_files.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/outputs.hpp"
+#include "exchange/bus_files.hpp"
+#include "exchange/corrected_urdf.hpp"
+#include "exchange/robot_header.hpp"
+#include "exchange/urdf_file.hpp"
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
-#include "files/robot_header.hpp"
-#include "files/urdf_file.hpp"
 #include "files/write_file.hpp"
-#include "kinematics/corrected_urdf.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -58,7 +59,7 @@ void Export::run() const {
 
 void Export::c_header() const {
   need(robot, "--robot");
-  const RobotFile file = load_robot(robot);
+  const Robot file = load_robot(robot);
   write_file(out, robot_header(file));
   const std::string hash = hex(nominal_hash(file.nominal));
   common.say(fmt::format("{}: nominal robot {} as the C constant {}, nominal hash {}…", out, file.name,
@@ -74,7 +75,7 @@ void Export::corrected_urdf() const {
   need(robot, "--robot");
   need(calibration, "--calibration");
   need(urdf, "--urdf");
-  const RobotFile file = load_robot(robot);
+  const Robot file = load_robot(robot);
   const Calibration set = load_calibration(calibration, file);
   const CorrectedUrdf corrected = correct_urdf(urdf, links, file, set);
   const LeftOut left = left_out_by_rigid(set, file, asked_poses);

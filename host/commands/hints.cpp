@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "commands/hints.hpp"
 
 #include <fmt/format.h>
@@ -8,7 +9,7 @@
 
 #include "bus/controller_client.hpp"
 #include "errors.hpp"
-#include "files/nearest.hpp"
+#include "nearest.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// After what went wrong: what to do next.
 #ifndef FLEXCOMP_HOST_COMMANDS_HINTS_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/identify.hpp"
 #include "commands/outputs.hpp"
 
@@ -16,6 +17,9 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "errors.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"
@@ -57,7 +61,7 @@ std::string in_degrees(const std::array<double, joint_count>& q) {
 }
 
 /// `NAME` or `NAME=VALUE`, the value in the unit that the name ends with.
-FixedParameter fixed_parameter(const std::string& text, const RobotFile& robot) {
+FixedParameter fixed_parameter(const std::string& text, const Robot& robot) {
   const std::size_t equals = text.rfind('=');
   // joint_compliance[joint=2].rad_per_nm has an equals sign of its own.
   const bool has_value = equals != std::string::npos && text.find(']', equals) == std::string::npos;
@@ -163,8 +167,8 @@ nlohmann::ordered_json repeats_json(const std::optional<PureError>& e) {
 void Identify::run() const {
   refuse_same_file({{"--robot", robot}, {"--data", data}, {"--tolerances", tolerances}},
                    {{"-o", out}, {"--report", report}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
-  const DataFile file = load_data(data, robot_file, {force});
+  const Robot robot_file = load_robot(robot);
+  const MeasuredData file = load_data(data, robot_file, {force});
   std::vector<std::string> warnings = file.warnings;
   const std::vector<Observation> rows = observe(file, robot_file, &warnings);
   IdentifyOptions options;
@@ -217,7 +221,7 @@ void Identify::run() const {
   }
   nlohmann::ordered_json cure = nlohmann::ordered_json::array();
   nlohmann::ordered_json cure_payload = nlohmann::ordered_json::array();
-  for (const CuringPose& c : r.known.cure) {
+  for (const SuggestedPose& c : r.known.cure) {
     nlohmann::ordered_json pose = nlohmann::ordered_json::array();
     for (const double v : c.q_rad) pose.push_back(degrees(v));
     cure.push_back(pose);
@@ -260,7 +264,7 @@ void Identify::run() const {
   if (!r.known.cure.empty()) {
     message += fmt::format("\n  These {} poses (joint readings in degrees, payload) would cure it:",
                            r.known.cure.size());
-    for (const CuringPose& c : r.known.cure)
+    for (const SuggestedPose& c : r.known.cure)
       message += fmt::format("\n   {}  {:.3f} kg", in_degrees(c.q_rad), c.payload_kg);
   }
   throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, message));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -11,10 +12,11 @@
 #include "commands/common_options.hpp"
 #include "commands/import_measurements.hpp"
 #include "commands/outputs.hpp"
-#include "files/input_error.hpp"
-#include "files/quaternion.hpp"
+#include "exchange/imported_arm.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
-#include "kinematics/imported_arm.hpp"
+#include "input_error.hpp"
+#include "quaternion.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "commands/import_measurements.hpp"
 
 #include <fmt/format.h>
@@ -12,13 +13,14 @@
 #include <stdexcept>
 
 #include "commands/numbers.hpp"
+#include "exchange/declared_unit.hpp"
+#include "exchange/joining.hpp"
+#include "exchange/point_list.hpp"
+#include "exchange/robot_log.hpp"
 #include "files/data_file.hpp"
-#include "files/declared_unit.hpp"
-#include "files/input_error.hpp"
-#include "files/point_list.hpp"
-#include "files/robot_log.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
-#include "measurement/joining.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -47,7 +49,7 @@ std::optional<Value> chosen(const std::map<std::string, Value>& names, const std
 }
 
 /// Asks the reader of data files about the text; what it refuses is said with the line of the file that it came from.
-std::vector<std::string> checked(const std::string& text, const std::string& out, const RobotFile& robot,
+std::vector<std::string> checked(const std::string& text, const std::string& out, const Robot& robot,
                                  const PointList& points, const RobotLog& log, const Joining& joining,
                                  bool force) {
   std::string folder = (std::filesystem::temp_directory_path() / "flexcomp-XXXXXX").string();
@@ -180,7 +182,7 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   if (!map.empty() && !joint_columns.empty())
     throw CLI::ValidationError("--joint-columns", "is the short form of --map: give one of them");
   refuse_idle();
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   LogMap how = map.empty() ? LogMap() : load_log_map(map);
   if (!joint_unit.empty()) how.joint_unit = angle_unit_of(joint_unit);
   if (!joint_columns.empty()) {

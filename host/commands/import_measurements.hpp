@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The half of `import` that makes a data file of an instrument's export and a robot's log.
 #ifndef FLEXCOMP_HOST_COMMANDS_IMPORT_MEASUREMENTS_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Checks of options that are numbers with a fraction. CLI11's own let "nan" pass, for no comparison with it is true.
 #ifndef FLEXCOMP_HOST_COMMANDS_NUMBERS_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files that a command writes, against those that it reads.
 #ifndef FLEXCOMP_HOST_COMMANDS_OUTPUTS_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,13 +21,14 @@
 #include "commands/numbers.hpp"
 #include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
-#include "files/calibration_file.hpp"
 #include "files/cell_file.hpp"
 #include "files/data_file.hpp"
-#include "files/input_error.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/sha256.hpp"
+#include "input_error.hpp"
 #include "measurement/reflectors.hpp"
+#include "model/calibration.hpp"
 #include "planning/exchange.hpp"
 #include "planning/feasibility.hpp"
 #include "planning/planner.hpp"
@@ -130,19 +132,19 @@ struct Plan {
  private:
   Instrument instrument(MeasurementKind kind, std::size_t reflectors, double position_sigma,
                         double orientation_sigma, const Points& shape) const;
-  void take_data(const RobotFile& robot_file, const std::optional<DataFile>& data);
-  void take_candidates(const RobotFile& robot_file, const Feasibility& feasibility);
-  void check_number(const RobotFile& robot_file);
+  void take_data(const Robot& robot_file, const std::optional<MeasuredData>& data);
+  void take_candidates(const Robot& robot_file, const Feasibility& feasibility);
+  void check_number(const Robot& robot_file);
   void search(Search& search, std::uint64_t& evaluations_before);
   nlohmann::ordered_json task() const;
   void load_state(Search& search) const;
   std::vector<Comparison> comparison(const std::vector<double>& random) const;
-  Page page(const RobotFile& robot_file, const PoseSet& set, const std::vector<Sigma>& sigmas,
+  Page page(const Robot& robot_file, const PoseSet& set, const std::vector<Sigma>& sigmas,
             const Search& search, double fitness, double random) const;
 
   PlanProblem problem_;
   std::optional<Cell> cell_;
-  std::vector<Sight> known_;
+  std::vector<PlannedMeasurement> known_;
   std::vector<std::string> warnings_;
   bool payload_column_ = false;
   bool stopped_ = false;
@@ -163,7 +165,7 @@ Instrument Plan::instrument(MeasurementKind kind, std::size_t reflectors, double
 }
 
 /// What has been measured, with the contexts and the noise it was measured with; and how the rest will be.
-void Plan::take_data(const RobotFile& robot_file, const std::optional<DataFile>& data) {
+void Plan::take_data(const Robot& robot_file, const std::optional<MeasuredData>& data) {
   MeasurementKind kind = measure.empty() ? MeasurementKind::pose : measurement_kinds.at(measure);
   if (measure.empty() && data && data->kind != MeasurementKind::joints) kind = data->kind;
   Points shape = robot_file.reflectors_m;
@@ -200,8 +202,8 @@ void Plan::take_data(const RobotFile& robot_file, const std::optional<DataFile>&
   }
 }
 
-void Plan::take_candidates(const RobotFile& robot_file, const Feasibility& feasibility) {
-  const DataFile file = load_joints(candidates, robot_file, {force});
+void Plan::take_candidates(const Robot& robot_file, const Feasibility& feasibility) {
+  const MeasuredData file = load_joints(candidates, robot_file, {force});
   warnings_.insert(warnings_.end(), file.warnings.begin(), file.warnings.end());
   if (file.rows.size() > most_candidates) {
     throw InputError(candidates, 0, "", fmt::format("at most {} candidates", most_candidates),
@@ -247,7 +249,7 @@ void Plan::take_candidates(const RobotFile& robot_file, const Feasibility& feasi
 }
 
 /// Too few poses give numbers that mean nothing.
-void Plan::check_number(const RobotFile& robot_file) {
+void Plan::check_number(const Robot& robot_file) {
   const auto least = least_poses(problem_, common.seed);
   if (!least) {
     throw InputError(candidates.empty() ? robot : candidates, 0, "",
@@ -382,7 +384,7 @@ void Plan::run() {
                     {"--state", state.empty() ? resume : state},
                     {"--json", common.json}});
   refuse_same_file({{"--resume", resume}}, {{"-o", out}, {"--report", report}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   if (!cell.empty()) cell_ = load_cell(cell);
   if (!robot_file.has_noise) {
     warnings_.push_back(fmt::format("{}: no noise given; {:.3g} mm and {:.3g} deg are assumed", robot,
@@ -402,7 +404,7 @@ void Plan::run() {
     context.payload_kg = kg;
     problem_.payloads.push_back(context);
   }
-  std::optional<DataFile> data;
+  std::optional<MeasuredData> data;
   if (!extend.empty()) {
     data = load_joints(extend, robot_file, {force});
     warnings_.insert(warnings_.end(), data->warnings.begin(), data->warnings.end());
@@ -434,7 +436,7 @@ void Plan::run() {
   // Says what stands in the way where nearly nothing is allowed.
   if (candidates.empty()) feasible_poses(feasibility, robot_file, 1, common.seed);
 
-  std::vector<Sight> like;
+  std::vector<PlannedMeasurement> like;
   for (const PoseContext& c : problem_.payloads) like.push_back({Joints{}, c, problem_.instrument});
   like.insert(like.end(), known_.begin(), known_.end());
   problem_.information = std::make_shared<PoseInformation>(robot_file, model_kinds.at(model), frames == "fit",
@@ -457,7 +459,7 @@ void Plan::run() {
   const std::vector<double> random = random_fitness(problem_, random_sets, common.seed);
   const double median = random[random.size() / 2];
 
-  DataFile plan;
+  MeasuredData plan;
   plan.columns.payload_mass = payload_column_;
   for (const PlannedPose& p : set) {
     Measurement row;
@@ -598,7 +600,7 @@ void Plan::run() {
   }
 }
 
-Page Plan::page(const RobotFile& robot_file, const PoseSet& set, const std::vector<Sigma>& sigmas,
+Page Plan::page(const Robot& robot_file, const PoseSet& set, const std::vector<Sigma>& sigmas,
                 const Search& search, double fitness, double random) const {
   Page page;
   page.arm = robot_file;
@@ -625,7 +627,7 @@ Page Plan::page(const RobotFile& robot_file, const PoseSet& set, const std::vect
     plan.q_rad.push_back(p.q_rad);
     if (payload_column_) plan.payload_kg.push_back(problem_.payloads[p.payload].payload_kg);
   }
-  for (const Sight& s : known_) plan.known_q_rad.push_back(s.q_rad);
+  for (const PlannedMeasurement& s : known_) plan.known_q_rad.push_back(s.q_rad);
   for (std::size_t j = 0; j < joint_count; ++j) {
     plan.limits_rad[j] = {problem_.limits[j].min_rad, problem_.limits[j].max_rad};
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <memory>
@@ -9,8 +10,9 @@
 #include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
-#include "files/quaternion.hpp"
+#include "files/robot_file.hpp"
 #include "kinematics/measured_pose.hpp"
+#include "quaternion.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -29,10 +31,10 @@ struct Predict {
 void Predict::run() const {
   refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--joints", joints}},
                    {{"-o", out}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   Calibration set;  // without a calibration: the nominal arm
   if (!calibration.empty()) set = load_calibration(calibration, robot_file);
-  DataFile data = load_joints(joints, robot_file, {force});
+  MeasuredData data = load_joints(joints, robot_file, {force});
   common.warn(data.warnings);
   const auto model = prepare(set.terms, robot_file, set.path);
   data.kind = MeasurementKind::pose;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -55,7 +56,7 @@ void Probe::run() const {
   refuse_same_file({{"--robot", robot}, {"--targets", targets}}, {{"-o", out}, {"--json", bus.json}});
   const std::unique_ptr<ControllerClient> client = bus.connect();
   // Limits, seeds and the defaults of the context are the robot's.
-  const RobotFile from = robot_of(*client, robot);
+  const Robot from = robot_of(*client, robot);
   const TargetsFile list = load_targets(targets, from, {force});
   bus.warn(list.warnings);
   const auto commands = joint_commands(list, from);

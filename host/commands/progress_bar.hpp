@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A bar on the terminal for what takes longer than a second.
 #ifndef FLEXCOMP_HOST_COMMANDS_PROGRESS_BAR_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <memory>
@@ -10,8 +11,8 @@
 #include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
-#include "files/image.hpp"
 #include "files/write_file.hpp"
+#include "model/parameter_image.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -37,7 +38,7 @@ struct Pull {
     const std::uint32_t sequence = client->status().active_sequence;
     result["sequence"] = sequence;
     if (!out.empty()) {
-      const RobotFile from_robot = robot_of(*client, robot);
+      const Robot from_robot = robot_of(*client, robot);
       try {
         Calibration calibration = calibration_from_image(bytes, from_robot, client->where());
         stamp(calibration, from_robot);

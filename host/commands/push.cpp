@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -11,7 +12,6 @@
 #include <vector>
 
 #include "bus/transfer.hpp"
-#include "catalogue/set_difference.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/colour.hpp"
 #include "commands/commands.hpp"
@@ -19,9 +19,11 @@
 #include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
-#include "files/image.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"
+#include "model/parameter_image.hpp"
+#include "model/set_difference.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -49,7 +51,7 @@ struct Push {
 constexpr std::size_t dry_run_poses = 500;
 
 /// A set of parameters as a controller holds it, from a file: a calibration, or an image.
-TermSet held_set(const std::string& path, const RobotFile& robot, const ImageOptions& options) {
+TermSet held_set(const std::string& path, const Robot& robot, const ImageOptions& options) {
   const std::optional<Bytes> image = read_image_file(path);
   const Bytes bytes = image ? *image : make_image(load_calibration(path, robot), robot, 1, options);
   return calibration_from_image(bytes, robot, path).terms;
@@ -83,7 +85,7 @@ std::string difference_table(const SetDifference& d) {
 void Push::show_changes() const {
   nlohmann::ordered_json result{{"dry_run", true}};
   std::vector<std::string> left_out;
-  RobotFile for_robot;
+  Robot for_robot;
   TermSet now;
   TermSet next;
   if (against.empty()) {
@@ -153,7 +155,7 @@ void Push::show_changes() const {
 }
 
 Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) const {
-  const RobotFile for_robot = robot_of(client, robot);
+  const Robot for_robot = robot_of(client, robot);
   const Calibration calibration = load_calibration_for(client, set, for_robot);
   left_out = never_pushed(calibration, for_robot);
   ImageOptions options;

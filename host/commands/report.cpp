@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,15 +11,16 @@
 #include <utility>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/numbers.hpp"
 #include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/csv.hpp"
-#include "files/input_error.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
+#include "input_error.hpp"
+#include "model/effects.hpp"
 #include "report/page.hpp"
 #include "report/parameters.hpp"
 #include "units.hpp"
@@ -157,7 +159,7 @@ void Report::run() const {
   }
   for (const std::string& text : results) read.push_back({"--result", pair_of(text, result_form).second});
   refuse_same_file(read, {{"-o", out}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   Page page;
   page.arm = robot_file;
   page.title = title.empty() ? "Calibration of " + robot_file.name : title;

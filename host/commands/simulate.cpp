@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -15,11 +16,12 @@
 #include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
-#include "files/input_error.hpp"
-#include "files/quaternion.hpp"
+#include "files/robot_file.hpp"
 #include "flexcomp/model.hpp"
+#include "input_error.hpp"
 #include "kinematics/measured_pose.hpp"
 #include "measurement/noise_level.hpp"
+#include "quaternion.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -53,15 +55,14 @@ struct Simulate {
   std::string out;
 
   void run() const;
-  Measurement random_place(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random) const;
-  void random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
+  Measurement random_place(std::size_t k, const Robot& robot_file, std::mt19937_64& random) const;
+  void random_context(std::size_t k, const Robot& robot_file, std::mt19937_64& random,
                       Measurement& row) const;
-  void measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
-                Measurement& row) const;
+  void measured(const Robot& robot_file, Pose<double> pose, std::mt19937_64& random, Measurement& row) const;
 };
 
 /// Motion, temperature and time that do not follow each other or the pose, so that their effects can be told apart.
-void Simulate::random_context(std::size_t k, const RobotFile& robot_file, std::mt19937_64& random,
+void Simulate::random_context(std::size_t k, const Robot& robot_file, std::mt19937_64& random,
                               Measurement& row) const {
   std::uniform_real_distribution<double> symmetric(-1, 1);
   double largest = 0;
@@ -79,7 +80,7 @@ void Simulate::random_context(std::size_t k, const RobotFile& robot_file, std::m
 }
 
 /// What the instrument says about a true pose.
-void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt19937_64& random,
+void Simulate::measured(const Robot& robot_file, Pose<double> pose, std::mt19937_64& random,
                         Measurement& row) const {
   const NoiseLevel& level = noise_levels.at(noise);
   std::normal_distribution<double> normal(0, 1);
@@ -105,8 +106,7 @@ void Simulate::measured(const RobotFile& robot_file, Pose<double> pose, std::mt1
 }
 
 /// Where to measure, and in which context.
-Measurement Simulate::random_place(std::size_t k, const RobotFile& robot_file,
-                                   std::mt19937_64& random) const {
+Measurement Simulate::random_place(std::size_t k, const Robot& robot_file, std::mt19937_64& random) const {
   Measurement row;
   row.context = default_context<double>(robot_file.nominal);
   for (std::size_t j = 0; j < joint_count; ++j) {
@@ -122,9 +122,9 @@ Measurement Simulate::random_place(std::size_t k, const RobotFile& robot_file,
 void Simulate::run() const {
   refuse_same_file({{"--robot", robot}, {"--truth", truth}, {"--joints", joints}},
                    {{"-o", out}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   Calibration set = load_calibration(truth, robot_file);
-  DataFile data;
+  MeasuredData data;
   if (joints.empty()) {
     data.columns.payload_mass = !payloads.empty();
     data.columns.move.fill(context);

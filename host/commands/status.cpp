@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <array>
@@ -9,8 +10,8 @@
 
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
-#include "files/calibration_file.hpp"
 #include "flexcomp/bytes.hpp"
+#include "model/calibration.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -35,7 +36,7 @@ void show_status(const BusOptions& bus) {
   const std::unique_ptr<ControllerClient> client = bus.connect();
   const wire::Capability& can = client->capability();
   const wire::Status now = client->status();
-  const std::optional<RobotFile> robot = client->robot();
+  const std::optional<Robot> robot = client->robot();
 
   const auto state = wire::name(static_cast<wire::StoreState>(now.state));
   const auto answer =

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/validate.hpp"
 #include "commands/outputs.hpp"
 
@@ -11,6 +12,9 @@
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "errors.hpp"
+#include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"
@@ -33,9 +37,9 @@ struct Validate {
 void Validate::run() const {
   refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--data", data}},
                    {{"--report", report}, {"--json", common.json}});
-  const RobotFile robot_file = load_robot(robot);
+  const Robot robot_file = load_robot(robot);
   const Calibration set = load_calibration(calibration, robot_file);
-  const DataFile file = load_data(data, robot_file, {force});
+  const MeasuredData file = load_data(data, robot_file, {force});
   std::vector<std::string> warnings = file.warnings;
   const std::vector<Observation> rows = observe(file, robot_file, &warnings);
   common.warn(warnings);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/candidates.hpp"
 
 #include <algorithm>
@@ -31,7 +32,7 @@ std::vector<std::size_t> curve_sizes(std::size_t poses) {
 
 class Builder {
  public:
-  Builder(const RobotFile& robot, const TermSet& set) : robot_(robot) {
+  Builder(const Robot& robot, const TermSet& set) : robot_(robot) {
     out_.set = set;
     model_.set = set;
     for (EffectGroup& group : effects_of(set, robot.nominal)) present_.push_back(std::move(group.id));
@@ -40,7 +41,7 @@ class Builder {
   /// Adds all parameters of an effect in the given forms (indices of its parameters; none: one form of all).
   void add(const EffectId& id, bool positive = false,
            const std::vector<std::vector<std::size_t>>& forms = {}) {
-    if (fault(id, robot_.nominal)) return;
+    if (validation_error(id, robot_.nominal)) return;
     for (const EffectId& other : present_) {
       if (same_name(other, id)) return;
     }
@@ -85,14 +86,14 @@ class Builder {
   CandidateSet& out() { return out_; }
 
  private:
-  const RobotFile& robot_;
+  const Robot& robot_;
   CandidateSet out_;
   ParametricModel model_;
   std::vector<EffectId> present_;
 };
 
 /// The lowest body that stands on the floor: where a pedestal gives way.
-double pivot_of(const RobotFile& robot) {
+double pivot_of(const Robot& robot) {
   double lowest = 0;
   for (const auto& c : robot.capsules) {
     if (c.frame == 0) lowest = std::min({lowest, c.from_m[2], c.to_m[2]});
@@ -129,7 +130,7 @@ Testable testable(const std::vector<Observation>& rows, const ContextColumns& co
   return t;
 }
 
-CandidateSet candidates(const RobotFile& robot, const std::vector<Observation>& rows,
+CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows,
                         const ContextColumns& columns, const TermSet& set) {
   const Testable can = testable(rows, columns);
   Builder b(robot, set);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Every name of the catalogue that these data may be asked about, as columns beside the model's own.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_CANDIDATES_HPP
@@ -6,11 +7,11 @@
 #include <cstddef>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
 #include "diagnosis/diagnose.hpp"
-#include "files/data_file.hpp"
-#include "files/robot_file.hpp"
+#include "measurement/measured_data.hpp"
 #include "measurement/observation.hpp"
+#include "model/effects.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -47,7 +48,7 @@ struct Testable {
 Testable testable(const std::vector<Observation>& rows, const ContextColumns& columns);
 
 /// All of them but those that `set` has already.
-CandidateSet candidates(const RobotFile& robot, const std::vector<Observation>& rows,
+CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows,
                         const ContextColumns& columns, const TermSet& set);
 
 /// Two forms of one name: the same effect at the same place, whatever its size or number of coefficients.

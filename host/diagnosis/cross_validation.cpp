@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/cross_validation.hpp"
 
 #include <Eigen/Dense>
 #include <array>
 #include <map>
 
-#include "diagnosis/blas.hpp"
+#include "linalg/blas.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What an explanation is worth on poses that it has not seen.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_CROSS_VALIDATION_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/diagnose.hpp"
 
 #include <fmt/format.h>
@@ -10,16 +11,16 @@
 #include <numeric>
 #include <random>
 
-#include "diagnosis/blas.hpp"
 #include "diagnosis/cross_validation.hpp"
-#include "diagnosis/explanation.hpp"
+#include "diagnosis/discriminating_poses.hpp"
+#include "diagnosis/effect_search.hpp"
 #include "diagnosis/refit.hpp"
-#include "diagnosis/remainder.hpp"
+#include "diagnosis/residual_analysis.hpp"
 #include "diagnosis/scatter.hpp"
 #include "diagnosis/subset_search.hpp"
-#include "diagnosis/telling_poses.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/identify.hpp"
+#include "linalg/blas.hpp"
 
 namespace flexcomp::host {
 
@@ -31,7 +32,7 @@ struct Start {
   Unknowns fitted;
 };
 
-Start start_from(const Calibration& calibration, const RobotFile& robot, const std::vector<Observation>& rows,
+Start start_from(const Calibration& calibration, const Robot& robot, const std::vector<Observation>& rows,
                  std::uint64_t seed) {
   Estimate estimate{calibration.terms, calibration.f(), calibration.e()};
   Unknowns all;
@@ -49,7 +50,7 @@ Start start_from(const Calibration& calibration, const RobotFile& robot, const s
   }
   all.prior = prior_knowledge(estimate.set, all.parameters, true, {});
   Start out;
-  out.fitted = what_is_knowable(robot, rows, estimate, all, seed).fitted;
+  out.fitted = analyse_identifiability(robot, rows, estimate, all, seed).fitted;
   out.fit = fit(estimate, out.fitted, rows, robot, {});
   return out;
 }
@@ -77,22 +78,22 @@ double declared_chi2(const std::vector<double>& weight, const std::vector<RowRes
 struct Answer {
   std::unique_ptr<const std::vector<Observation>> rows;
   Start start;
-  std::unique_ptr<const Explainer> explainer;
+  std::unique_ptr<const EffectSearch> explainer;
   Explanation found;
   Refit refit;
 };
 
 using Tell = std::function<void(const std::string&, double)>;
 
-Answer answer_for(const RobotFile& robot, const std::vector<Observation>& rows, const ContextColumns& columns,
+Answer answer_for(const Robot& robot, const std::vector<Observation>& rows, const ContextColumns& columns,
                   Start start, bool poses_scatter, const Tell& tell, double done) {
   Answer out;
   out.rows = std::make_unique<const std::vector<Observation>>(rows);
   out.start = std::move(start);
   const Estimate& at = out.start.fit.estimate;
   const Unknowns& fitted = out.start.fitted;
-  out.explainer = std::make_unique<const Explainer>(robot, *out.rows, columns, at, fitted,
-                                                    out.start.fit.weight, poses_scatter);
+  out.explainer = std::make_unique<const EffectSearch>(robot, *out.rows, columns, at, fitted,
+                                                       out.start.fit.weight, poses_scatter);
   out.found = out.explainer->explain(
       [&](double share) { tell("searching the catalogue", done + (0.6 - done) * share); });
   tell("the model with what was found", 0.6);
@@ -109,7 +110,7 @@ Answer answer_for(const RobotFile& robot, const std::vector<Observation>& rows, 
 }
 
 /// Shares of a refitted model's misfit by the noise that these rows declare.
-std::vector<PlaceShare> places_left_at(const Refit& refit, const RobotFile& robot,
+std::vector<PlaceShare> places_left_at(const Refit& refit, const Robot& robot,
                                        const std::vector<Observation>& rows) {
   std::vector<bool> counts;
   for (const double w : refit.fit.weight) counts.push_back(w >= 1);
@@ -131,7 +132,7 @@ double price(const Answer& answer) {
   const SubsetSearch& search = *answer.found.search;
   const Scored& s = answer.found.solution;
   const double scale2 = search.noise_scale2();
-  const Remainder left = remainder(search, s);
+  const ResidualAnalysis left = remainder(search, s);
   const auto masked = static_cast<double>(std::count(system.counts.begin(), system.counts.end(), false));
   return left.residual.squaredNorm() / scale2 + system.numbers * std::log(scale2) + (s.chi2_gain - s.gain) +
          search.margins(s.blocks) + masked * outlier_price;
@@ -142,7 +143,7 @@ double price(const Answer& answer) {
 /// the better of the two answers stands.
 /// \param places  shares of the misfit at the start
 /// \return whether it is the one with a place that moves
-bool prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Observation>& rows,
+bool prefer_scatter(Answer& answer, const Robot& robot, const std::vector<Observation>& rows,
                     const Start& at_first, const ContextColumns& columns,
                     const std::vector<PlaceShare>& places, const Tell& tell) {
   // Many rows bear a little scatter without taking it for structure, and each answer takes its time.
@@ -205,7 +206,7 @@ bool prefer_scatter(Answer& answer, const RobotFile& robot, const std::vector<Ob
 /// distribution of their maxima.
 class ChanceGains {
  public:
-  ChanceGains(const SubsetSearch& search, const Remainder& left, std::uint64_t seed) {
+  ChanceGains(const SubsetSearch& search, const ResidualAnalysis& left, std::uint64_t seed) {
     const GapSystem& system = search.system();
     const std::size_t count = system.rows > most_few_rows ? 100 : 200;
     std::mt19937_64 random(seed);
@@ -263,7 +264,7 @@ class ChanceGains {
 
 }  // namespace
 
-Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows, const std::string& source,
+Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,
                    const DiagnoseOptions& options) {
   Diagnosis out;
   const auto tell = [&](const std::string& what, double share) {
@@ -294,7 +295,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   out.places = place_shares(first.system(), remainder(first, first.score({})));
   const bool scatters = answer.found.unnamed &&
                         prefer_scatter(answer, robot, rows, at_first, options.columns, out.places, tell);
-  const Explainer& explainer = *answer.explainer;
+  const EffectSearch& explainer = *answer.explainer;
   const Explanation& found = answer.found;
   const Refit& refit = answer.refit;
   out.not_testable = explainer.not_testable();
@@ -320,7 +321,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   // --- the search's own figures -----------------------------------------------------------------------------------
   const GapSystem& system = *found.system;
   const SubsetSearch& search = *found.search;
-  const Remainder left = remainder(search, found.solution);
+  const ResidualAnalysis left = remainder(search, found.solution);
   out.dropped = system.dropped;
   out.places_left = scatters ? places_left_at(refit, robot, rows) : place_shares(system, left);
   const ChanceGains chance(search, left, options.seed);
@@ -354,7 +355,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   Subset so_far;
   const auto step = [&](std::string what) {
     const Scored s = search.score(so_far);
-    const Remainder r = remainder(search, s);
+    const ResidualAnalysis r = remainder(search, s);
     DiagnosisStep d;
     d.what = std::move(what);
     d.chi2_per_dof = r.residual.squaredNorm() / std::max(1.0, system.numbers - r.fitted_numbers);
@@ -389,7 +390,7 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
   const bool unnamed = found.unnamed;
   out.verdict = unnamed ? Verdict::unnamed : out.effects.empty() ? Verdict::none : Verdict::named;
   if (!out.where && !out.effects.empty()) out.where = misfit_of(out.effects.front(), out.places);
-  for (const Piece& piece : found.pieces) {
+  for (const Hypothesis& piece : found.pieces) {
     if (!piece.local) continue;
     const Eigen::VectorXd inside = local_values(*piece.local, rows);
     std::vector<std::size_t> lines;
@@ -408,8 +409,9 @@ Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows,
         fmt::format("{} of {} rows are outliers and do not count in full", out.outliers.size(), rows.size()));
 
   tell("poses that tell rivals apart", 0.9);
-  out.telling_poses = telling_poses(robot, *answer.rows, answer.start.fit.estimate, answer.start.fitted,
-                                    explainer.candidate_set(), found, out.effects, options.seed);
+  out.discriminating_poses =
+      discriminating_poses(robot, *answer.rows, answer.start.fit.estimate, answer.start.fitted,
+                           explainer.candidate_set(), found, out.effects, options.seed);
 
   if (!refit.fit.converged)
     out.doubts.push_back(

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Where model and measurement still disagree: find it, name it, add it to the model, and show that the gap shrinks.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSE_HPP
@@ -9,14 +10,14 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/calibration_file.hpp"
-#include "files/data_file.hpp"
-#include "files/robot_file.hpp"
 #include "identification/estimator.hpp"
-#include "identification/knowable.hpp"
+#include "identification/parameter_selection.hpp"
 #include "identification/statistics.hpp"
+#include "measurement/measured_data.hpp"
 #include "measurement/observation.hpp"
+#include "model/calibration.hpp"
+#include "model/effects.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -101,12 +102,13 @@ struct Diagnosis {
   std::vector<NotTestable> not_testable;
   std::vector<EffectId> dropped;  ///< columns of which less than 1e-3 is left after geometry and frames
   std::optional<Misfit> where;    ///< of the gap: the remaining one if unnamed, else that of the first effect
-  std::vector<PlaceShare> places;         ///< of the model at the start, largest first
-  std::vector<PlaceShare> places_left;    ///< of the final model
-  std::vector<DiagnosisStep> steps;       ///< first the model at the start
-  std::vector<CuringPose> telling_poses;  ///< tell confounded names apart, best first; empty where none are
-  Calibration before;                     ///< the model at the start
-  Calibration after;                      ///< with what was found; an unnamed remainder as effect `unnamed`
+  std::vector<PlaceShare> places;       ///< of the model at the start, largest first
+  std::vector<PlaceShare> places_left;  ///< of the final model
+  std::vector<DiagnosisStep> steps;     ///< first the model at the start
+  std::vector<SuggestedPose>
+      discriminating_poses;  ///< tell confounded names apart, best first; empty where none are
+  Calibration before;        ///< the model at the start
+  Calibration after;         ///< with what was found; an unnamed remainder as effect `unnamed`
   std::vector<RowResidual> residuals_before, residuals_after;  ///< per row
   std::vector<std::size_t> outliers;                           ///< rows that do not count in full, by index
   ErrorStatistics error_before, error_after;                   ///< of the rows that were fitted
@@ -122,7 +124,7 @@ constexpr double telling_bic = 10;
 
 /// \param source  names the data in messages
 /// \throws InputError  as identify()
-Diagnosis diagnose(const RobotFile& robot, const std::vector<Observation>& rows, const std::string& source,
+Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,
                    const DiagnoseOptions& options);
 
 }  // namespace flexcomp::host

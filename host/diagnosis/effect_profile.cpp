@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/effect_profile.hpp"
 
 #include <fmt/format.h>
@@ -85,7 +86,7 @@ double along(const Eigen::VectorXd& column, const Eigen::VectorXd& turn, Eigen::
 
 }  // namespace
 
-std::optional<EffectProfile> profile_of(const RobotFile& robot, const Calibration& calibration,
+std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& calibration,
                                         const EffectId& id, const std::vector<Observation>& rows) {
   const auto what = follows(id);
   if (!what || rows.empty()) return std::nullopt;

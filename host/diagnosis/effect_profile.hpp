@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// An effect as a curve, and what the rows say of it: the numbers behind its drawing.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_EFFECT_PROFILE_HPP
@@ -7,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/calibration_file.hpp"
 #include "measurement/observation.hpp"
+#include "model/calibration.hpp"
+#include "model/effects.hpp"
 
 namespace flexcomp::host {
 
@@ -37,7 +38,7 @@ struct EffectProfile {
 
 /// Of an effect that turns one joint and follows one quantity; nothing where it is of another kind, or not in the
 /// calibration.
-std::optional<EffectProfile> profile_of(const RobotFile& robot, const Calibration& calibration,
+std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& calibration,
                                         const EffectId& id, const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/gap_system.hpp"
 
 #include <Eigen/Dense>
@@ -5,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "diagnosis/blas.hpp"
+#include "linalg/blas.hpp"
 
 namespace flexcomp::host {
 
@@ -75,7 +76,7 @@ void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
   system.blocks.push_back(std::move(block));
 }
 
-GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& rows,
+GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
                      const std::vector<bool>& counts, const Estimate& estimate, const Unknowns& fitted,
                      const CandidateSet& all) {
   GapSystem out;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The misfit of a fitted model as one linear system: what is left of the whitened residuals after everything that the
 /// model may still move is projected out, and what each candidate would do to it.
@@ -9,9 +10,9 @@
 #include <vector>
 
 #include "diagnosis/candidates.hpp"
-#include "files/robot_file.hpp"
 #include "identification/residuals.hpp"
 #include "measurement/observation.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -62,7 +63,7 @@ struct GapSystem {
 
 /// \param estimate  its set is that of `all`, with present values
 /// \param fitted    what the model moves, without the candidates
-GapSystem gap_system(const RobotFile& robot, const std::vector<Observation>& rows,
+GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
                      const std::vector<bool>& counts, const Estimate& estimate, const Unknowns& fitted,
                      const CandidateSet& all);
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/held_out.hpp"
 
 #include <fmt/format.h>
@@ -10,8 +11,9 @@
 #include <map>
 #include <system_error>
 
-#include "files/input_error.hpp"
+#include "files/data_file.hpp"
 #include "identification/validate.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -45,7 +47,7 @@ double noise_floor_m(const std::vector<Observation>& rows) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(rows.size(), 1)));
 }
 
-HeldOut held_out(const RobotFile& robot, const Diagnosis& d, const std::vector<Observation>& rows,
+HeldOut held_out(const Robot& robot, const Diagnosis& d, const std::vector<Observation>& rows,
                  const std::string& source, bool force) {
   HeldOut out;
   out.rows = rows.size();
@@ -64,7 +66,7 @@ HeldOut held_out(const RobotFile& robot, const Diagnosis& d, const std::vector<O
   return out;
 }
 
-void refuse_the_fitted(const DataFile& fitted, const DataFile& other) {
+void refuse_the_fitted(const MeasuredData& fitted, const MeasuredData& other) {
   const char* const expected = "poses that were not fitted: held-out rows must not be those of --data";
   std::error_code unknown;
   if (fitted.path == other.path || std::filesystem::equivalent(fitted.path, other.path, unknown))
@@ -79,7 +81,7 @@ void refuse_the_fitted(const DataFile& fitted, const DataFile& other) {
   }
 }
 
-std::vector<std::string> missing_columns(const DataFile& fitted, const DataFile& other) {
+std::vector<std::string> missing_columns(const MeasuredData& fitted, const MeasuredData& other) {
   const std::vector<std::string> have = joint_and_context_names(other.columns);
   std::vector<std::string> missing;
   for (const std::string& name : joint_and_context_names(fitted.columns)) {

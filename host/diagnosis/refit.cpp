@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/refit.hpp"
 
 #include <Eigen/Dense>
@@ -74,7 +75,7 @@ std::vector<double> nodes_of(const Bump& bump, std::size_t side, double low, dou
 }
 
 /// The smooth function as a table that the core reads: its values at nodes of two variables.
-void add_table_of(const Piece& piece, const Explanation& found, const RobotFile& robot,
+void add_table_of(const Hypothesis& piece, const Explanation& found, const Robot& robot,
                   ParametricModel& model) {
   constexpr std::size_t nodes = 25;
   EffectId id{.effect = Effect::unnamed};
@@ -88,7 +89,7 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
       id.covariate_joint[side] = of[side]->joint;
       const double low = of[side]->value.minCoeff();
       const double high = of[side]->value.maxCoeff();
-      const std::size_t count = of[side]->kind == Covariate::reading ? nodes : 5;
+      const std::size_t count = of[side]->kind == Covariate::joint_position ? nodes : 5;
       if (piece.function->bump) {
         id.node[side] = nodes_of(*piece.function->bump, side, low, high);
         continue;
@@ -126,7 +127,7 @@ void add_table_of(const Piece& piece, const Explanation& found, const RobotFile&
 }
 
 /// Turns a curve's mean over the readings that occur into the offset of its joint: the pose stays what it is.
-void centre_curve(TermSet& set, const Term<double>& term, const RobotFile& robot) {
+void centre_curve(TermSet& set, const Term<double>& term, const Robot& robot) {
   const Table& table = set.tables[term.table];
   double* c = set.values.data() + table.offset;
   const JointLimits& limits = robot.nominal.limits[term.joint];
@@ -147,7 +148,7 @@ void centre_curve(TermSet& set, const Term<double>& term, const RobotFile& robot
 
 }  // namespace
 
-Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, const Estimate& start,
+Refit refit_with(const Robot& robot, const std::vector<Observation>& rows, const Estimate& start,
                  const Unknowns& fitted, const Explanation& found) {
   Refit out;
   ParametricModel model;
@@ -161,7 +162,7 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
   };
 
   std::map<unsigned, CurveParts> curves;
-  for (const Piece& piece : found.pieces) {
+  for (const Hypothesis& piece : found.pieces) {
     if (piece.id.effect != Effect::joint_curve) continue;
     CurveParts& parts = curves[piece.id.joint];
     if (piece.local) {
@@ -187,7 +188,7 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
     }
     curve_ranges.emplace_back(from, out.fitted.parameters.size());
   }
-  for (const Piece& piece : found.pieces) {
+  for (const Hypothesis& piece : found.pieces) {
     if (piece.id.effect == Effect::joint_curve) continue;
     if (piece.function) {
       add_table_of(piece, found, robot, model);
@@ -242,7 +243,7 @@ Refit refit_with(const RobotFile& robot, const std::vector<Observation>& rows, c
   return out;
 }
 
-void describe(FoundEffect& effect, const Refit& refit, const RobotFile& robot,
+void describe(FoundEffect& effect, const Refit& refit, const Robot& robot,
               const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance) {
   const TermSet& set = refit.fit.estimate.set;
   for (EffectGroup& group : effects_of(set, robot.nominal)) {

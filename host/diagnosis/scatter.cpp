@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/scatter.hpp"
 
 #include <Eigen/Dense>
@@ -98,7 +99,7 @@ class Narrowing {
 
 }  // namespace
 
-ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows,
+ScatteredModel scattered_model(const Robot& robot, const std::vector<Observation>& rows,
                                const Estimate& start, const Unknowns& fitted,
                                const std::vector<double>& weight) {
   ScatteredModel out;

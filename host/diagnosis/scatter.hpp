@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Places of the chain that move from pose to pose and follow nothing that was recorded: play whose direction nobody wrote
 /// down, joints that were read too early, a screw that is loose.
@@ -6,9 +7,9 @@
 
 #include <vector>
 
-#include "files/robot_file.hpp"
 #include "identification/estimator.hpp"
 #include "measurement/observation.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -30,7 +31,7 @@ struct ScatteredModel {
 
 /// Maximum likelihood, place after place, in turns with the parameters.
 /// \param fitted  what the rows move, beginning at `start`; rows of `weight` below 1 do not speak of the scatter
-ScatteredModel scattered_model(const RobotFile& robot, const std::vector<Observation>& rows,
+ScatteredModel scattered_model(const Robot& robot, const std::vector<Observation>& rows,
                                const Estimate& start, const Unknowns& fitted,
                                const std::vector<double>& weight);
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/subset_search.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "diagnosis/blas.hpp"
+#include "linalg/blas.hpp"
 
 namespace flexcomp::host {
 

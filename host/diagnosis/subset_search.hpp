@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Which blocks explain the misfit, and which could be exchanged without the data noticing.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_SUBSET_SEARCH_HPP

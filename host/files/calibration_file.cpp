@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/calibration_file.hpp"
 
 #include <fmt/chrono.h>
@@ -11,12 +12,12 @@
 #include <map>
 #include <stdexcept>
 
-#include "catalogue/catalogue.hpp"
-#include "files/nearest.hpp"
-#include "files/quaternion.hpp"
 #include "files/write_file.hpp"
 #include "files/yaml_field.hpp"
 #include "files/yaml_text.hpp"
+#include "model/effects.hpp"
+#include "nearest.hpp"
+#include "quaternion.hpp"
 
 namespace flexcomp::host {
 
@@ -30,7 +31,7 @@ constexpr std::size_t link_slot_count = 5;  // gamma has no constant part
 /// Builds the terms of a file in its order.
 class SetReader {
  public:
-  SetReader(Calibration& calibration, const RobotFile& robot) : out_(calibration), robot_(robot) {}
+  SetReader(Calibration& calibration, const Robot& robot) : out_(calibration), robot_(robot) {}
 
   void geometric(const YamlField& list) {
     std::map<unsigned, std::size_t> seen;
@@ -74,7 +75,7 @@ class SetReader {
     }
     std::vector<std::string> selectors{"effect"};
     const EffectId id = identity(entry, *effect, selectors);
-    if (const auto wrong = fault(id, robot_.nominal)) throw entry.error(*wrong, name(id));
+    if (const auto wrong = validation_error(id, robot_.nominal)) throw entry.error(*wrong, name(id));
     const auto [at, is_new] = seen_.emplace(name(id), entry.line());
     if (!is_new)
       throw entry.error("each effect once", fmt::format("{} again (first in line {})", name(id), at->second));
@@ -270,7 +271,7 @@ class SetReader {
 
  private:
   Calibration& out_;
-  const RobotFile& robot_;
+  const Robot& robot_;
   std::map<std::string, std::size_t> seen_;
 };
 
@@ -298,7 +299,7 @@ Sha256Digest read_hash(const YamlField& field) {
   return digest;
 }
 
-void read_head(const YamlField& root, const RobotFile& robot, Calibration& c) {
+void read_head(const YamlField& root, const Robot& robot, Calibration& c) {
   if (const auto field = root.find("robot")) {
     c.robot = field->text();
     if (c.robot != robot.name)
@@ -467,22 +468,7 @@ std::string effect_text(const Calibration& c, const EffectGroup& group) {
 
 }  // namespace
 
-Frame Frame::of(const Pose<double>& pose) { return {pose.position, unit_quaternion(pose.rotation)}; }
-
-std::string hex(const Sha256Digest& digest) {
-  std::string text;
-  for (const std::uint8_t byte : digest) text += fmt::format("{:02x}", byte);
-  return text;
-}
-
-void stamp(Calibration& calibration, const RobotFile& robot) {
-  calibration.robot = robot.name;
-  calibration.nominal_hash = nominal_hash(robot.nominal);
-  calibration.tool_version = FLEXCOMP_VERSION;
-  calibration.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
-
-Calibration load_calibration(const std::string& path, const RobotFile& robot) {
+Calibration load_calibration(const std::string& path, const Robot& robot) {
   const YamlField root = YamlField::load(path);
   root.require_keys({"robot", "nominal_hash", "flexcomp_version", "date", "sequence", "frames", "geometric",
                      "base", "tool", "effects", "confounded", "at_bound", "residuals", "covariance_factor"});
@@ -499,7 +485,7 @@ Calibration load_calibration(const std::string& path, const RobotFile& robot) {
   return calibration;
 }
 
-std::string calibration_text(const Calibration& c, const RobotFile& robot) {
+std::string calibration_text(const Calibration& c, const Robot& robot) {
   canonical(c.terms, robot.nominal);  // throws where a term would be lost below
   std::string text = "# Differences from the nominal robot, each with its standard deviation (sigma_…).\n";
   text += "robot: " + yaml_quoted(robot.name) + "\n";
@@ -555,7 +541,7 @@ std::string calibration_text(const Calibration& c, const RobotFile& robot) {
   return text;
 }
 
-void save_calibration(const std::string& path, const Calibration& calibration, const RobotFile& robot) {
+void save_calibration(const std::string& path, const Calibration& calibration, const Robot& robot) {
   write_file(path, calibration_text(calibration, robot));
 }
 

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/capsule.hpp"
 
-#include "files/robot_file.hpp"
 #include "files/yaml_field.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 

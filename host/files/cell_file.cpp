@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/cell_file.hpp"
 
+#include "files/capsule.hpp"
 #include "files/yaml_field.hpp"
 
 namespace flexcomp::host {

@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/csv.hpp"
 
 #include <fmt/format.h>
 
 #include <cstring>
 
-#include "files/input_error.hpp"
-#include "files/nearest.hpp"
 #include "files/read_file.hpp"
 #include "files/text.hpp"
+#include "input_error.hpp"
+#include "nearest.hpp"
 
 namespace flexcomp::host {
 

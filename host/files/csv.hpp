@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Comma-separated text with one header line. Strict: a row is read in full or refused with its line.
 #ifndef FLEXCOMP_HOST_FILES_CSV_HPP

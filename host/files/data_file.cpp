@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/data_file.hpp"
 
 #include <fmt/format.h>
@@ -9,10 +10,10 @@
 #include <unordered_map>
 
 #include "files/csv.hpp"
-#include "files/input_error.hpp"
-#include "files/nearest.hpp"
-#include "files/quaternion.hpp"
 #include "files/write_file.hpp"
+#include "input_error.hpp"
+#include "nearest.hpp"
+#include "quaternion.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -67,7 +68,7 @@ bool is_known(const std::string& name) {
 /// Reads the columns that data files and targets have in common, and remembers which ones it used.
 class ColumnReader {
  public:
-  ColumnReader(CsvTable table, const RobotFile& robot)
+  ColumnReader(CsvTable table, const Robot& robot)
       : table_(std::move(table)), robot_(robot), used_(table_.header.size()) {
     payload_ = use("payload_kg");
     temperature_ = use("temp_c");
@@ -245,7 +246,7 @@ class ColumnReader {
   }
 
   CsvTable table_;
-  const RobotFile& robot_;
+  const Robot& robot_;
   std::vector<bool> used_;
   Column payload_, temperature_, time_, position_sigma_, orientation_sigma_;
   std::array<Column, 3> com_, force_;
@@ -330,9 +331,9 @@ void refuse_repeats(const CsvTable& table) {
   }
 }
 
-DataFile load(const std::string& path, const RobotFile& robot, const LoadOptions& options, bool measured) {
+MeasuredData load(const std::string& path, const Robot& robot, const LoadOptions& options, bool measured) {
   ColumnReader reader(read_csv(path), robot);
-  DataFile data;
+  MeasuredData data;
   data.path = path;
   const auto joints = reader.require_joints(joint_name, "joint readings q1_deg … q6_deg");
   const MeasuredColumns columns = find_measured(reader, measured);
@@ -369,22 +370,11 @@ std::string joined(const std::vector<std::string>& cells) {
 
 }  // namespace
 
-bool ContextColumns::all_moves() const {
-  return std::all_of(move.begin(), move.end(), [](bool b) { return b; });
-}
-
-bool ContextColumns::all_directions() const {
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    if (!move[j] && !direction[j]) return false;
-  }
-  return true;
-}
-
-DataFile load_data(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+MeasuredData load_data(const std::string& path, const Robot& robot, const LoadOptions& options) {
   return load(path, robot, options, true);
 }
 
-DataFile load_joints(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+MeasuredData load_joints(const std::string& path, const Robot& robot, const LoadOptions& options) {
   return load(path, robot, options, false);
 }
 
@@ -447,7 +437,7 @@ std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, 
   return cells;
 }
 
-std::string data_text(const DataFile& data) {
+std::string data_text(const MeasuredData& data) {
   std::vector<std::string> names = joint_and_context_names(data.columns);
   if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
     for (std::size_t k = 0; k < 3; ++k) names.push_back(position_name(k));
@@ -482,9 +472,9 @@ std::string data_text(const DataFile& data) {
   return text;
 }
 
-void save_data(const std::string& path, const DataFile& data) { write_file(path, data_text(data)); }
+void save_data(const std::string& path, const MeasuredData& data) { write_file(path, data_text(data)); }
 
-TargetsFile load_targets(const std::string& path, const RobotFile& robot, const LoadOptions& options) {
+TargetsFile load_targets(const std::string& path, const Robot& robot, const LoadOptions& options) {
   ColumnReader reader(read_csv(path), robot);
   TargetsFile targets;
   targets.path = path;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Measured data and targets: joint readings, what was measured there, and the context in which it was.
 #ifndef FLEXCOMP_HOST_FILES_DATA_FILE_HPP
@@ -10,8 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "files/robot_file.hpp"
-#include "flexcomp/robot.hpp"
+#include "measurement/measured_data.hpp"
 
 namespace flexcomp::host {
 
@@ -23,66 +23,22 @@ struct LoadOptions {
       false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong
 };
 
-enum class MeasurementKind { joints, position, pose, reflectors };  ///< joints: nothing measured
-
-/// One row. What was measured is in the measurement frame (of F, or any frame of the instrument).
-struct Measurement {
-  std::size_t line = 0;
-  std::array<double, joint_count> q_rad{};  ///< joint readings
-  Context<double, joint_count> context;     ///< with the defaults of the robot file where a column is absent
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< norm 1, w >= 0
-  std::array<Eigen::Vector3d, 4> reflector_m{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
-                                             Eigen::Vector3d::Zero(),
-                                             Eigen::Vector3d::Zero()};  ///< A, B, C(, D)
-  std::array<double, joint_count> move_rad{};  ///< last motion of each joint, 0 where unknown
-  double position_sigma_m = 0;                 ///< per axis of the position, or of each reflector point
-  double orientation_sigma_rad = 0;            ///< per axis of the rotation vector
-  std::vector<std::string> extra;              ///< cells of the columns that have no meaning here
-};
-
-/// Which optional columns a file has (or shall get).
-struct ContextColumns {
-  bool payload_mass = false;
-  std::array<bool, 3> payload_com{};
-  std::array<bool, joint_count> move{};
-  std::array<bool, joint_count> direction{};
-  bool temperature = false;
-  bool time = false;
-  bool position_sigma = false;
-  bool orientation_sigma = false;
-  std::array<bool, 3> force{};
-
-  bool all_moves() const;       ///< relative speeds are known
-  bool all_directions() const;  ///< a direction column or a motion for every joint
-};
-
-struct DataFile {
-  std::string path;
-  MeasurementKind kind = MeasurementKind::joints;
-  std::size_t reflectors = 0;  ///< 3 or 4 where kind is reflectors
-  std::vector<Measurement> rows;
-  ContextColumns columns;
-  std::vector<std::string> extra;     ///< names of columns without meaning here, passed through
-  std::vector<std::string> warnings;  ///< for people, complete sentences with file and column
-};
-
 /// Reads measured data (contract.md, Data file).
 /// A row whose |norm - 1| of the quaternion exceeds 1e-3 is refused, below that it is normalised.
 /// \throws InputError  file:line: column for: a missing column, an empty cell, what is not a finite number, a reading
 ///                     beyond its limit in the robot file, dir not -1, 0 or 1, a sigma that is not positive, a row that
 ///                     repeats another one in all its values, no rows; no reading above 7 degrees in three rows or
 ///                     more (suspicion of radians; not where options.force)
-DataFile load_data(const std::string& path, const RobotFile& robot, const LoadOptions& options = {});
+MeasuredData load_data(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
 /// The same, for files of which only joints and context are used: measured columns may be absent, rows may repeat.
-DataFile load_joints(const std::string& path, const RobotFile& robot, const LoadOptions& options = {});
+MeasuredData load_joints(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
 /// The text of a data file: reads back to the identical doubles (contexts' defaults are not written).
-std::string data_text(const DataFile& data);
+std::string data_text(const MeasuredData& data);
 
 /// Writes data_text() atomically. \throws std::runtime_error where the file cannot be written
-void save_data(const std::string& path, const DataFile& data);
+void save_data(const std::string& path, const MeasuredData& data);
 
 /// The columns that say under which circumstances a row was measured: payload_kg, move1_deg …, temp_c, fx_n …; not time_s.
 const std::vector<std::string>& context_names();
@@ -115,7 +71,7 @@ struct TargetsFile {
 /// Reads targets: joint commands, or poses with seeds. A joint command beyond a limit is not refused here: that is the
 /// controller's answer, given per row.
 /// \throws InputError  as load_data(), and for a pose without seeds
-TargetsFile load_targets(const std::string& path, const RobotFile& robot, const LoadOptions& options = {});
+TargetsFile load_targets(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
 }  // namespace flexcomp::host
 

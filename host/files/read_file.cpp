@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/read_file.hpp"
 
 #include <array>
@@ -6,7 +7,7 @@
 #include <cstring>
 #include <memory>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The bytes of a file that a user named.
 #ifndef FLEXCOMP_HOST_FILES_READ_FILE_HPP

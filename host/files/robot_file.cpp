@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/robot_file.hpp"
 
 #include <fmt/format.h>
@@ -6,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "files/capsule.hpp"
 #include "files/yaml_field.hpp"
 #include "files/yaml_text.hpp"
 
@@ -29,7 +31,7 @@ double length(const YamlField& joint, const char* key, LongLinks long_links) {
   return value;
 }
 
-void read_joint(const YamlField& joint, std::size_t i, LongLinks long_links, RobotFile& robot) {
+void read_joint(const YamlField& joint, std::size_t i, LongLinks long_links, Robot& robot) {
   joint.require_keys({"theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "min_deg", "max_deg",
                       "max_speed_deg_s", "gear_ratio"});
   NominalLink& link = robot.nominal.links[i];
@@ -52,7 +54,7 @@ void read_joint(const YamlField& joint, std::size_t i, LongLinks long_links, Rob
   }
 }
 
-void read_tool(const YamlField& tool, RobotFile& robot) {
+void read_tool(const YamlField& tool, Robot& robot) {
   tool.require_keys({"xyz_mm", "quaternion_wxyz", "reflectors_mm"});
   if (const auto xyz = tool.find("xyz_mm")) robot.nominal.tool_xyz_m = array3(xyz->vector3(unit::mm));
   if (const auto wxyz = tool.find("quaternion_wxyz")) {
@@ -74,7 +76,7 @@ std::string list_text(const Eigen::Vector3d& v, const Unit& unit) {
 
 Eigen::Vector3d vector3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-std::string joint_text(const RobotFile& robot, std::size_t i) {
+std::string joint_text(const Robot& robot, std::size_t i) {
   const NominalLink& link = robot.nominal.links[i];
   const JointLimits& limits = robot.nominal.limits[i];
   std::string text = fmt::format(
@@ -91,7 +93,7 @@ std::string joint_text(const RobotFile& robot, std::size_t i) {
 
 }  // namespace
 
-std::string robot_text(const RobotFile& robot, const std::vector<std::string>& comment) {
+std::string robot_text(const Robot& robot, const std::vector<std::string>& comment) {
   const NominalRobot<joint_count>& nominal = robot.nominal;
   std::string text;
   for (std::string line : comment) {
@@ -133,11 +135,11 @@ std::string robot_text(const RobotFile& robot, const std::vector<std::string>& c
 
 namespace {
 
-RobotFile read_robot(const YamlField& root, LongLinks long_links) {
+Robot read_robot(const YamlField& root, LongLinks long_links) {
   const std::string& path = root.file();
   root.require_keys(
       {"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise", "capsules"});
-  RobotFile robot;
+  Robot robot;
   robot.path = path;
   robot.name = root.at("name").text();
   robot.nominal.name_hash = name_hash(robot.name.data(), robot.name.size());
@@ -177,11 +179,11 @@ RobotFile read_robot(const YamlField& root, LongLinks long_links) {
 
 }  // namespace
 
-RobotFile load_robot(const std::string& path, LongLinks long_links) {
+Robot load_robot(const std::string& path, LongLinks long_links) {
   return read_robot(YamlField::load(path), long_links);
 }
 
-RobotFile parse_robot(const std::string& text, const std::string& name) {
+Robot parse_robot(const std::string& text, const std::string& name) {
   return read_robot(YamlField::parse(text, name), LongLinks::refused);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What readers of text do to a piece of it.
 #ifndef FLEXCOMP_HOST_FILES_TEXT_HPP

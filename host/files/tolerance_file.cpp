@@ -1,12 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/tolerance_file.hpp"
 
 #include <fmt/format.h>
 
 #include <string_view>
 
-#include "files/input_error.hpp"
-#include "files/nearest.hpp"
 #include "files/yaml_field.hpp"
+#include "input_error.hpp"
+#include "nearest.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What is known of an arm before it is measured: how far from its drawing each parameter may be.
 #ifndef FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
@@ -7,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/term_set.hpp"
+#include "model/term_set.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files appear whole or not at all.
 #ifndef FLEXCOMP_HOST_FILES_WRITE_FILE_HPP

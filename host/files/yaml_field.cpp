@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "files/yaml_field.hpp"
 
 #include <fmt/format.h>
@@ -6,9 +7,9 @@
 #include <charconv>
 #include <utility>
 
-#include "files/nearest.hpp"
-#include "files/quaternion.hpp"
 #include "files/read_file.hpp"
+#include "nearest.hpp"
+#include "quaternion.hpp"
 
 namespace flexcomp::host {
 

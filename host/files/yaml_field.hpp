@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A node of a YAML file that knows where it stands, so that whatever is wrong with it can be said with file, line and
 /// field.
@@ -13,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

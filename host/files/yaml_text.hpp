@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Numbers and names as text that every reader of YAML takes for what they are.
 #ifndef FLEXCOMP_HOST_FILES_YAML_TEXT_HPP

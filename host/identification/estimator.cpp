@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/estimator.hpp"
 
 #include <Eigen/Dense>
@@ -125,7 +126,7 @@ struct Point {
 
 class Descent {
  public:
-  Descent(const Unknowns& unknowns, const std::vector<Observation>& rows, const RobotFile& robot,
+  Descent(const Unknowns& unknowns, const std::vector<Observation>& rows, const Robot& robot,
           const TermSet& set)
       : unknowns_(unknowns), rows_(rows), robot_(robot), units_(units_of(unknowns, set)) {
     const Eigen::Index n = static_cast<Eigen::Index>(unknowns.count());
@@ -215,7 +216,7 @@ class Descent {
 
   const Unknowns& unknowns_;
   const std::vector<Observation>& rows_;
-  const RobotFile& robot_;
+  const Robot& robot_;
   Eigen::VectorXd units_;
   Eigen::VectorXd precision_;  // of the priors
   Eigen::VectorXd expected_;
@@ -252,7 +253,7 @@ double chi2_quantile(double probability, double degrees_of_freedom) {
 }
 
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
-        const RobotFile& robot, const EstimatorOptions& options) {
+        const Robot& robot, const EstimatorOptions& options) {
   Fit out;
   const Descent descent(unknowns, rows, robot, start.set);
   Point point = descent.at(start);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Modified Levenberg-Marquardt on the nonlinear model (Chen et al. 2019, Section 4), whitened and robust.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_ESTIMATOR_HPP
@@ -54,7 +55,7 @@ struct Fit {
 /// lose their pull, and Gaussian data lose nothing. Bounds are kept by every step (active set), and the proof of
 /// convergence is that of the bounded problem.
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
-        const RobotFile& robot, const EstimatorOptions& options = {});
+        const Robot& robot, const EstimatorOptions& options = {});
 
 /// Quantile of the chi-square distribution.
 double chi2_quantile(double probability, double degrees_of_freedom);

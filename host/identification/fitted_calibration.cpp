@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/fitted_calibration.hpp"
 
 #include <Eigen/Dense>
@@ -35,7 +36,7 @@ void keep_what_was_identified(Calibration& calibration, const TermSet& set, cons
 
 }  // namespace
 
-Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const RobotFile& robot) {
+Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot) {
   Calibration out;
   const Eigen::VectorXd units = units_of(fitted, fit.estimate.set);
   const Eigen::VectorXd sigma = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt().cwiseProduct(units);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/frames.hpp"
 
 #include <Eigen/Dense>
@@ -73,7 +74,7 @@ void solve_translations(const std::vector<Observation>& rows, const std::vector<
 
 }  // namespace
 
-Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const RobotFile& robot) {
+Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot) {
   Estimate start;
   start.set = set;
   const auto model = prepare(set, robot, "frames");

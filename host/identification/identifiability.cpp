@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/identifiability.hpp"
 
 #include <Eigen/Dense>
@@ -87,7 +88,7 @@ std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermS
   return order;
 }
 
-std::vector<Observation> random_observations(const RobotFile& robot, const std::vector<Observation>& like,
+std::vector<Observation> random_observations(const Robot& robot, const std::vector<Observation>& like,
                                              std::size_t count, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   std::vector<Observation> rows(count);

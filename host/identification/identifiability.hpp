@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Which parameters can be known at all, which cannot, and with what each lost one is confounded.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
@@ -8,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "files/robot_file.hpp"
 #include "identification/residuals.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -42,7 +43,7 @@ Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix);
 std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set);
 
 /// Random poses inside the joint limits, measured as `like` was: same kind, and its contexts in turn.
-std::vector<Observation> random_observations(const RobotFile& robot, const std::vector<Observation>& like,
+std::vector<Observation> random_observations(const Robot& robot, const std::vector<Observation>& like,
                                              std::size_t count, std::uint64_t seed);
 
 }  // namespace flexcomp::host

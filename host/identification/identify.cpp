@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/identify.hpp"
 
 #include <fmt/format.h>
@@ -6,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "files/input_error.hpp"
-#include "files/nearest.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/identifiability.hpp"
+#include "input_error.hpp"
+#include "nearest.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -22,7 +23,7 @@ namespace {
 constexpr double usual_error_per_reach = 5e-4;
 constexpr double suspicious_factor = 100;
 
-double reach(const RobotFile& robot) {
+double reach(const Robot& robot) {
   double sum = 0;
   for (const NominalLink& link : robot.nominal.links) sum += std::hypot(link.a_m, link.d_m);
   return sum;
@@ -39,7 +40,7 @@ double spread(const std::vector<Eigen::Vector3d>& points) {
 }
 
 /// Takes fixed parameters out of those to be fitted and sets their values.
-void fix(const std::vector<FixedParameter>& fixed, const RobotFile& robot, TermSet& set,
+void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& set,
          std::vector<Parameter>& parameters) {
   for (const FixedParameter& f : fixed) {
     const auto found = std::find_if(parameters.begin(), parameters.end(),
@@ -58,7 +59,7 @@ void fix(const std::vector<FixedParameter>& fixed, const RobotFile& robot, TermS
 
 }  // namespace
 
-Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows, Estimate* fitted) {
+Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted) {
   Before before;
   Estimate nominal;
   const auto model = prepare(TermSet(), robot, "nominal robot");
@@ -72,7 +73,7 @@ Before errors_before(const RobotFile& robot, const std::vector<Observation>& row
   return before;
 }
 
-void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
+void refuse_the_implausible(const Robot& robot, const std::vector<Observation>& rows,
                             const std::string& source, const Before& before) {
   const double limit = suspicious_factor * usual_error_per_reach * reach(robot);
   const double found = before.fitted_frames
@@ -95,8 +96,8 @@ void refuse_the_implausible(const RobotFile& robot, const std::vector<Observatio
                    fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
 }
 
-Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
-                        const std::string& source, const IdentifyOptions& options) {
+Identification identify(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,
+                        const IdentifyOptions& options) {
   Identification out;
   Estimate start;
   out.before = errors_before(robot, rows, &start);
@@ -119,7 +120,7 @@ Identification identify(const RobotFile& robot, const std::vector<Observation>& 
   fix(options.fixed, robot, start.set, all.parameters);
   all.prior = prior_knowledge(start.set, all.parameters, options.physical, options.tolerances);
   // At the nominal arm, where nothing is parallel by accident only.
-  out.known = what_is_knowable(robot, rows, start, all, options.seed);
+  out.known = analyse_identifiability(robot, rows, start, all, options.seed);
   const Unknowns& fitted = out.known.fitted;
   out.frame_parameters = fitted.frames.size();
   out.identifiable = fitted.parameters.size();

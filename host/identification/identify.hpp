@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// From measured rows to a calibration: what can be known, its values, and how far to trust them.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
@@ -8,14 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/calibration_file.hpp"
 #include "files/tolerance_file.hpp"
 #include "identification/estimator.hpp"
 #include "identification/frames.hpp"
-#include "identification/knowable.hpp"
+#include "identification/parameter_selection.hpp"
 #include "identification/statistics.hpp"
 #include "measurement/repeats.hpp"
+#include "model/calibration.hpp"
+#include "model/effects.hpp"
 
 namespace flexcomp::host {
 
@@ -46,10 +47,10 @@ struct Identification {
   std::size_t parameters = 0;    ///< of the model, without F and E
   std::size_t identifiable = 0;  ///< of these, in these data
   std::size_t frame_parameters = 0;
-  Knowable known;        ///< what these data know, what they lack, and what would cure it
-  Fit fit;               ///< of known.fitted
-  double condition = 0;  ///< of the whitened, scaled columns of the parameters
-  double o1 = 0;         ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
+  Identifiability known;  ///< what these data know, what they lack, and what would cure it
+  Fit fit;                ///< of known.fitted
+  double condition = 0;   ///< of the whitened, scaled columns of the parameters
+  double o1 = 0;          ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
   Before before;
   ErrorStatistics after;
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where the model has them, per row
@@ -64,15 +65,14 @@ struct Identification {
 /// \param source  names the data in messages
 /// \throws InputError  a fixed parameter or a tolerance of one that the model does not have; residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
 ///                     millimetres, another arm), unless options.force; a fitted base above 20 mm or 2 degrees
-Identification identify(const RobotFile& robot, const std::vector<Observation>& rows,
-                        const std::string& source, const IdentifyOptions& options);
+Identification identify(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,
+                        const IdentifyOptions& options);
 
 /// Errors of the nominal arm, in nominal and in fitted frames. `model` (optional) receives the fitted frames.
-Before errors_before(const RobotFile& robot, const std::vector<Observation>& rows,
-                     Estimate* fitted = nullptr);
+Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
 
 /// \throws InputError  the rows are further from the nominal arm than any arm of this size: another unit, another arm
-void refuse_the_implausible(const RobotFile& robot, const std::vector<Observation>& rows,
+void refuse_the_implausible(const Robot& robot, const std::vector<Observation>& rows,
                             const std::string& source, const Before& before);
 
 }  // namespace flexcomp::host

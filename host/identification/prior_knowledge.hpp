@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What is known of parameters before anything is measured.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
@@ -6,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "catalogue/term_set.hpp"
 #include "files/tolerance_file.hpp"
+#include "model/term_set.hpp"
 
 namespace flexcomp::host {
 

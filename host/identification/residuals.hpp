@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Whitened residuals of measured poses against the model, with their exact derivatives.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_RESIDUALS_HPP
@@ -8,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/host_model.hpp"
-#include "catalogue/term_set.hpp"
 #include "flexcomp/linear.hpp"
 #include "identification/prior_knowledge.hpp"
 #include "measurement/observation.hpp"
+#include "model/host_model.hpp"
+#include "model/term_set.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Errors of many rows in the few numbers that people compare.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP

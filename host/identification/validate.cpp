@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "identification/validate.hpp"
 
 #include <fmt/format.h>
@@ -5,7 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 
@@ -14,7 +15,7 @@ namespace {
 /// r^T (1 + A A^T)^-1 r with A = whitened derivative * covariance factor, without forming the large matrix (Woodbury).
 double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows, const Calibration& calibration,
-                                   const RobotFile& robot) {
+                                   const Robot& robot) {
   const CovarianceFactor& covariance = *calibration.covariance;
   Unknowns unknowns;
   Unknowns every_frame;
@@ -54,13 +55,13 @@ Estimate estimate_of(const Calibration& calibration) {
 
 }  // namespace
 
-std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibration& calibration,
+std::vector<RowResidual> residuals_with(const Robot& robot, const Calibration& calibration,
                                         const std::vector<Observation>& rows) {
   const auto model = prepare(calibration.terms, robot, calibration.path);
   return residuals(estimate_of(calibration), *model, rows);
 }
 
-ErrorStatistics errors_of_corrected(const RobotFile& robot, const Calibration& calibration,
+ErrorStatistics errors_of_corrected(const Robot& robot, const Calibration& calibration,
                                     const std::vector<Observation>& rows) {
   const auto nominal = prepare(TermSet(), robot, robot.path);
   Estimate frames = estimate_of(calibration);
@@ -68,8 +69,8 @@ ErrorStatistics errors_of_corrected(const RobotFile& robot, const Calibration& c
   return statistics(residuals(frames, *nominal, rows), rows);
 }
 
-Validation validate(const RobotFile& robot, const Calibration& calibration,
-                    const std::vector<Observation>& rows, const std::string& source) {
+Validation validate(const Robot& robot, const Calibration& calibration, const std::vector<Observation>& rows,
+                    const std::string& source) {
   Validation out;
   Estimate fitted;
   out.before = errors_before(robot, rows, &fitted);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// How far a calibrated arm is off on rows that were not fitted.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
@@ -26,16 +27,16 @@ struct Validation {
 };
 
 /// Errors of the rows with the frames of the calibration (F = E = 1 where it has none).
-Validation validate(const RobotFile& robot, const Calibration& calibration,
-                    const std::vector<Observation>& rows, const std::string& source);
+Validation validate(const Robot& robot, const Calibration& calibration, const std::vector<Observation>& rows,
+                    const std::string& source);
 
 /// Rows of an arm that was driven with corrected commands while their joints are those that the program wanted: what is
 /// left against the drawing, in the frames of the calibration. Nothing is fitted.
-ErrorStatistics errors_of_corrected(const RobotFile& robot, const Calibration& calibration,
+ErrorStatistics errors_of_corrected(const Robot& robot, const Calibration& calibration,
                                     const std::vector<Observation>& rows);
 
 /// Residuals of rows against a calibration, in its frames.
-std::vector<RowResidual> residuals_with(const RobotFile& robot, const Calibration& calibration,
+std::vector<RowResidual> residuals_with(const Robot& robot, const Calibration& calibration,
                                         const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host

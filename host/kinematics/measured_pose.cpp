@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "kinematics/measured_pose.hpp"
 
 #include "flexcomp/forward.hpp"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// From a model to what an instrument sees.
 #ifndef FLEXCOMP_HOST_KINEMATICS_MEASURED_POSE_HPP
@@ -5,10 +6,10 @@
 
 #include <array>
 
-#include "catalogue/host_model.hpp"
-#include "files/calibration_file.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
+#include "model/calibration.hpp"
+#include "model/host_model.hpp"
 
 namespace flexcomp::host {
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "kinematics/nominal_inverse.hpp"
 
 #include <Eigen/QR>
@@ -5,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "files/input_error.hpp"
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
+#include "input_error.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -72,7 +73,7 @@ std::optional<JointVector> nominal_inverse(const NominalRobot<joint_count>& robo
 
 std::vector<JointVector> nominal_inverses(const NominalRobot<joint_count>& robot,
                                           const Pose<double>& target) {
-  // Enough that of no pose of tests/host/nominal_inverse_test.cpp (six arms) a way was missed.
+  // Enough that no solution was missed at any pose of the test nominal_inverse_test.cpp (six arms).
   constexpr std::uint64_t seeds = 160;
   constexpr double same_rad = 1e-6;
   constexpr std::array<std::uint64_t, joint_count> primes{2, 3, 5, 7, 11, 13};
@@ -115,7 +116,7 @@ std::vector<JointVector> nominal_inverses(const NominalRobot<joint_count>& robot
   return out;
 }
 
-std::vector<JointVector> joint_commands(const TargetsFile& targets, const RobotFile& robot) {
+std::vector<JointVector> joint_commands(const TargetsFile& targets, const Robot& robot) {
   std::vector<JointVector> commands;
   for (const Target& t : targets.rows) {
     if (!targets.poses) {

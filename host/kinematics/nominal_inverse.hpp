@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Joint commands of the nominal arm for poses of its tool.
 #ifndef FLEXCOMP_HOST_KINEMATICS_NOMINAL_INVERSE_HPP
@@ -8,8 +9,8 @@
 #include <vector>
 
 #include "files/data_file.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/linear.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -25,8 +26,7 @@ std::vector<std::array<double, joint_count>> nominal_inverses(const NominalRobot
                                                               const Pose<double>& target);
 
 /// The joint command of every target. \throws InputError with the line of a pose that is not reached from its seed
-std::vector<std::array<double, joint_count>> joint_commands(const TargetsFile& targets,
-                                                            const RobotFile& robot);
+std::vector<std::array<double, joint_count>> joint_commands(const TargetsFile& targets, const Robot& robot);
 
 }  // namespace flexcomp::host
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "measurement/frame_fit.hpp"
 
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 #include "measurement/reflectors.hpp"
 
 namespace flexcomp::host {

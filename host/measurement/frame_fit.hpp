@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Where a tracker stands: its frame in the constructed base frame Fb, from points that are known in both.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "measurement/observation.hpp"
 
 #include <fmt/format.h>
@@ -5,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 #include "measurement/reflectors.hpp"
 
 namespace flexcomp::host {
@@ -14,7 +15,7 @@ namespace {
 
 constexpr double improbable = 1e-6;
 
-std::vector<Points> reflector_rows(const DataFile& data) {
+std::vector<Points> reflector_rows(const MeasuredData& data) {
   std::vector<Points> rows;
   for (const Measurement& m : data.rows) {
     rows.emplace_back(m.reflector_m.begin(),
@@ -28,7 +29,7 @@ std::vector<Points> reflector_rows(const DataFile& data) {
 }
 
 /// The template in the order of the data's columns: the robot file's, or the mean shape of the data.
-Points choose_template(const DataFile& data, const RobotFile& robot, const std::vector<Points>& rows) {
+Points choose_template(const MeasuredData& data, const Robot& robot, const std::vector<Points>& rows) {
   if (robot.reflectors_m.empty()) return estimate_template(rows);
   if (robot.reflectors_m.size() < data.reflectors) {
     throw InputError(robot.path, 0, "tool.reflectors_mm.d",
@@ -57,7 +58,7 @@ std::string moved(const Suspicion& suspicion) {
 }
 
 /// Names what slipped in these rows (indices, ascending). Rows that follow each other with the same shape show one slip.
-void warn(const DataFile& data, const RobotFile& robot, const std::vector<Points>& rows, const Points& shape,
+void warn(const MeasuredData& data, const Robot& robot, const std::vector<Points>& rows, const Points& shape,
           const std::vector<std::size_t>& slipped, std::vector<std::string>& warnings) {
   if (2 * slipped.size() > data.rows.size() && !robot.reflectors_m.empty()) {
     warnings.push_back(fmt::format(
@@ -91,7 +92,7 @@ void warn(const DataFile& data, const RobotFile& robot, const std::vector<Points
   }
 }
 
-void observe_reflectors(const DataFile& data, const RobotFile& robot, std::vector<Observation>& observations,
+void observe_reflectors(const MeasuredData& data, const Robot& robot, std::vector<Observation>& observations,
                         std::vector<std::string>* warnings) {
   const std::vector<Points> rows = reflector_rows(data);
   const Points shape = choose_template(data, robot, rows);
@@ -114,7 +115,7 @@ void observe_reflectors(const DataFile& data, const RobotFile& robot, std::vecto
 
 }  // namespace
 
-std::vector<Observation> observe(const DataFile& data, const RobotFile& robot,
+std::vector<Observation> observe(const MeasuredData& data, const Robot& robot,
                                  std::vector<std::string>* warnings) {
   if (data.kind == MeasurementKind::joints) {
     throw InputError(data.path, 1, "", "something measured (x_mm y_mm z_mm or reflectors)", "joints only");

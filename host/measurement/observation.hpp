@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What was measured, whatever the instrument, as poses or positions with their uncertainty.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_OBSERVATION_HPP
@@ -9,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "files/data_file.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/robot.hpp"
+#include "measurement/measured_data.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -35,7 +36,7 @@ struct Observation {
 /// estimated over all rows (its gauge, model.md section 6, is then part of E). Rows whose misfit has a probability below
 /// 1e-6 are named in `warnings`, with the reflector that moved, or those that may have (suspect_reflectors()).
 /// \throws InputError  nothing measured; reflectors on one line; a template without the D that the data have
-std::vector<Observation> observe(const DataFile& data, const RobotFile& robot,
+std::vector<Observation> observe(const MeasuredData& data, const Robot& robot,
                                  std::vector<std::string>* warnings = nullptr);
 
 }  // namespace flexcomp::host

@@ -1,4 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "measurement/reflectors.hpp"
+#include "model/frames.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
@@ -23,10 +25,6 @@ Points transformed(const Pose<double>& pose, std::span<const Eigen::Vector3d> po
   Points out;
   for (const Eigen::Vector3d& p : points) out.emplace_back(pose.rotation * p + pose.position);
   return out;
-}
-
-Pose<double> inverse(const Pose<double>& pose) {
-  return {pose.rotation.transpose(), -(pose.rotation.transpose() * pose.position)};
 }
 
 double chi2_above(double chi2, double degrees_of_freedom) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Rigid fit of reflector points A, B, C(, D) to a template, and the template where none is known.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_REFLECTORS_HPP

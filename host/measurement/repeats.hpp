@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Repeated poses: what the instrument and the arm's own repeatability scatter, whatever the model, and whether the model
 /// misses more than that.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// How good a set of poses is (Chen et al. 2019, Eq. 30-33), kept up to date by low-rank updates.
 ///

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// DETMAX (Mitchell 1974): D-optimal sets by excursions, in which the set grows and shrinks by several poses before it
 /// comes back to its size. The baseline of the paper's Fig. 8.

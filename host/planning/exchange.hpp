@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Exchange among candidates (Fedorov; Cook and Nachtsheim): every pose of the set in turn is taken out and the best
 /// candidate put in its place, until a whole round changes nothing.

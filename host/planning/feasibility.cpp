@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "planning/feasibility.hpp"
 
 #include <fmt/format.h>
@@ -8,8 +9,8 @@
 #include <limits>
 #include <random>
 
-#include "files/input_error.hpp"
 #include "flexcomp/trigonometry.hpp"
+#include "input_error.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -64,7 +65,7 @@ std::string name_of(Obstruction obstruction) {
   return "allowed";
 }
 
-Feasibility::Feasibility(const RobotFile& robot, const std::optional<Cell>& cell)
+Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
     : source_(cell ? cell->path : robot.path), limits_(robot.nominal.limits) {
   for (std::size_t i = 0; i < joint_count; ++i) {
     const NominalLink& link = robot.nominal.links[i];
@@ -121,7 +122,7 @@ Feasibility::Feasibility(const RobotFile& robot, const std::optional<Cell>& cell
 }
 
 /// Bodies of the arm that may meet each other or an obstacle.
-void Feasibility::choose_pairs(const RobotFile& robot, const std::vector<LinkFrames>& samples) {
+void Feasibility::choose_pairs(const Robot& robot, const std::vector<LinkFrames>& samples) {
   std::array<bool, joint_count + 1> occupied{};
   for (const Capsule& capsule : robot.capsules) occupied[capsule.frame] = true;
   const auto neighbours = [&](std::size_t f, std::size_t g) {
@@ -370,7 +371,7 @@ std::string Feasibility::why(const Joints& q_rad) const {
   return {};
 }
 
-std::vector<Joints> feasible_poses(const Feasibility& feasibility, const RobotFile& robot, std::size_t count,
+std::vector<Joints> feasible_poses(const Feasibility& feasibility, const Robot& robot, std::size_t count,
                                    std::uint64_t seed) {
   const std::size_t most_tries = 100000 + 1000 * count;
   RandomPoses random(robot.nominal.limits, seed);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Whether a measurement pose can be taken: joint limits, bodies, and the laser tracker's beam (Chen et al. 2019, Section
 /// 3.2, Eq. 26-29), by exact distances.
@@ -12,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "files/cell_file.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "flexcomp/model.hpp"
+#include "model/cell.hpp"
+#include "model/robot.hpp"
 #include "planning/segments.hpp"
 
 namespace flexcomp::host {
@@ -54,7 +55,7 @@ std::string name_of(Obstruction obstruction);
 /// Const and thread-safe; about a microsecond a call.
 class Feasibility {
  public:
-  explicit Feasibility(const RobotFile& robot, const std::optional<Cell>& cell = {});
+  explicit Feasibility(const Robot& robot, const std::optional<Cell>& cell = {});
 
   /// The first obstruction found, cheap tests first: joint limit, facing, bodies, tool, beam.
   Obstruction check(const std::array<double, joint_count>& q_rad) const;
@@ -105,7 +106,7 @@ class Feasibility {
   bool find_touch(const Axes& axes, Finding& finding) const;
   bool find_tool(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
   bool find_beam(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
-  void choose_pairs(const RobotFile& robot, const std::vector<LinkFrames>& samples);
+  void choose_pairs(const Robot& robot, const std::vector<LinkFrames>& samples);
   void choose_clearances(const std::vector<LinkFrames>& samples);
   void warn_of_tracker();
   std::string reflector_name(std::size_t k) const;
@@ -131,7 +132,7 @@ class Feasibility {
 /// \throws InputError  naming the cell (or robot) file and how often each obstruction stood against a pose, where fewer
 ///                     than about one random pose in a thousand is allowed
 std::vector<std::array<double, joint_count>> feasible_poses(const Feasibility& feasibility,
-                                                            const RobotFile& robot, std::size_t count,
+                                                            const Robot& robot, std::size_t count,
                                                             std::uint64_t seed);
 
 }  // namespace flexcomp::host

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// From a task to a list of poses that somebody can drive to: the methods by name, the least number of poses, what random
 /// poses would give, rounding, and the order of travel.

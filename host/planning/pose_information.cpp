@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "planning/pose_information.hpp"
 
 #include <Eigen/Cholesky>
@@ -55,16 +56,16 @@ Instrument Instrument::reflectors(const std::vector<Eigen::Vector3d>& template_m
   return i;
 }
 
-PoseInformation::PoseInformation(const RobotFile& robot, ModelKind kind, bool frames,
-                                 const std::vector<Sight>& like, std::uint64_t seed) {
+PoseInformation::PoseInformation(const Robot& robot, ModelKind kind, bool frames,
+                                 const std::vector<PlannedMeasurement>& like, std::uint64_t seed) {
   model_.prepare(robot.nominal, TermList<double>());  // no terms: nothing to refuse
   const ParametricModel paper = paper_model(robot.nominal, kind, !frames);
   parameters_of_model_ = paper.parameters.size();
   Unknowns all;
   all.parameters = paper.parameters;
   if (frames) {
-    const bool orientation =
-        std::any_of(like.begin(), like.end(), [](const Sight& s) { return s.instrument.rows() == 6; });
+    const bool orientation = std::any_of(
+        like.begin(), like.end(), [](const PlannedMeasurement& s) { return s.instrument.rows() == 6; });
     for (std::size_t i = 0; i < (orientation ? 12U : 9U); ++i) all.frames.push_back(i);
   }
   frames_ = all.frames;
@@ -80,7 +81,7 @@ PoseInformation::PoseInformation(const RobotFile& robot, ModelKind kind, bool fr
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * reference_poses), unknowns());
   Block h;
   for (std::size_t k = 0; k < reference_poses; ++k) {
-    Sight sight = like[k % like.size()];
+    PlannedMeasurement sight = like[k % like.size()];
     for (std::size_t j = 0; j < joint_count; ++j) {
       const JointLimits& limits = robot.nominal.limits[j];
       sight.q_rad[j] = std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What one measured pose says about the parameters of the paper's model: its rows of the whitened, scaled
 /// identification matrix H (Chen et al. 2019, Eq. 23), fast enough to be asked a million times.
@@ -11,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/data_file.hpp"
-#include "files/robot_file.hpp"
 #include "flexcomp/model.hpp"
+#include "measurement/measured_data.hpp"
+#include "model/effects.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -48,7 +49,7 @@ class Instrument {
 };
 
 /// A pose as an instrument sees it, measured already or meant to be.
-struct Sight {
+struct PlannedMeasurement {
   Joints q_rad{};
   PoseContext context;
   Instrument instrument = Instrument::position(1);
@@ -61,8 +62,8 @@ class PoseInformation {
   ///                  nuisance, of any position near the nominal one
   /// \param like      contexts and instruments that there will be; 1,000 random poses measured like these, in turn, say
   ///                  which parameters such data can know at all (the others are left out, as identify leaves them)
-  PoseInformation(const RobotFile& robot, ModelKind kind, bool frames, const std::vector<Sight>& like,
-                  std::uint64_t seed = 1);
+  PoseInformation(const Robot& robot, ModelKind kind, bool frames,
+                  const std::vector<PlannedMeasurement>& like, std::uint64_t seed = 1);
 
   Eigen::Index unknowns() const { return nuisance() + parameters(); }
   Eigen::Index nuisance() const { return static_cast<Eigen::Index>(frames_.size()); }  ///< of F and E
@@ -76,7 +77,7 @@ class PoseInformation {
   const std::vector<double>& file_units() const { return file_units_; }
 
   /// H of one pose. About 2 microseconds.
-  void block(const Sight& sight, Block& out) const {
+  void block(const PlannedMeasurement& sight, Block& out) const {
     block(sight.q_rad, sight.context, sight.instrument, out);
   }
   void block(const Joints& q_rad, const PoseContext& context, const Instrument& instrument, Block& out) const;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The default method: exchange over a few hundred random poses, then all joint angles at once along the gradient of the
 /// criterion, then one pose after another is replaced and the whole refined again.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Particle swarm with self-adaptive inertia (Chen et al. 2019, Eq. 33-35): every particle is a whole set of poses.
 #ifndef FLEXCOMP_HOST_PLANNING_SAPSO_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The task of choosing poses, and what every method of doing so has in common: small steps that can be watched,
 /// stopped, written down and gone on with.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Exact distances between segments.
 #ifndef FLEXCOMP_HOST_PLANNING_SEGMENTS_HPP

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "diagnosis/effect_profile.hpp"
-#include "diagnosis/words.hpp"
+#include "diagnosis/messages.hpp"
 #include "report/parameters.hpp"
 #include "report/plots.hpp"
 #include "report/results.hpp"
@@ -165,7 +166,7 @@ std::pair<std::string, std::string> unnamed_figure(const Calibration& set, const
       {}};
   const std::size_t columns = id.node[1].size();
   const std::size_t step = std::max<std::size_t>(1, (columns + 4) / 5);
-  const auto shown = [](Covariate c, double v) { return c == Covariate::reading ? degrees(v) : v; };
+  const auto shown = [](Covariate c, double v) { return c == Covariate::joint_position ? degrees(v) : v; };
   for (std::size_t c = 0; c < columns; c += step) {
     Curve curve;
     curve.name = fmt::format("{} = {:.4g}", covariate_name(id.covariate[1], id.covariate_joint[1]),
@@ -179,8 +180,7 @@ std::pair<std::string, std::string> unnamed_figure(const Calibration& set, const
   return {plot_curves(curves), fmt::format("{}: {}.", place_name(id.place), in_words(id))};
 }
 
-PageSection effects_section(const Diagnosis& d, const RobotFile& robot,
-                            const std::vector<Observation>& rows) {
+PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::vector<Observation>& rows) {
   PageSection section;
   section.title = "What was found";
   section.columns = {"effect",    "largest [mm]",      "rms [mm]",           "p",
@@ -234,10 +234,10 @@ PageSection telling_section(const Diagnosis& d) {
   section.columns = {"pose"};
   for (std::size_t j = 0; j < joint_count; ++j) section.columns.push_back(fmt::format("q{} [deg]", j + 1));
   section.columns.emplace_back("payload [kg]");
-  for (std::size_t k = 0; k < d.telling_poses.size(); ++k) {
+  for (std::size_t k = 0; k < d.discriminating_poses.size(); ++k) {
     std::vector<std::string> row{fmt::format("{}", k + 1)};
-    for (const double q : d.telling_poses[k].q_rad) row.push_back(fmt::format("{:.2f}", degrees(q)));
-    row.push_back(fmt::format("{:g}", d.telling_poses[k].payload_kg));
+    for (const double q : d.discriminating_poses[k].q_rad) row.push_back(fmt::format("{:.2f}", degrees(q)));
+    row.push_back(fmt::format("{:g}", d.discriminating_poses[k].payload_kg));
     section.rows.push_back(row);
   }
   return section;
@@ -245,7 +245,7 @@ PageSection telling_section(const Diagnosis& d) {
 
 }  // namespace
 
-Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::optional<HeldOut>& others) {
   Page p = titled_page("Diagnosis of " + robot.name, robot);
   p.summary = verdict_sentence(d);
@@ -268,7 +268,7 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
   p.sections.push_back(effects_section(d, robot, rows));
   if (!d.not_testable.empty() || !d.dropped.empty() || !d.notes.empty())
     p.sections.push_back(open_section(d));
-  if (!d.telling_poses.empty()) p.sections.push_back(telling_section(d));
+  if (!d.discriminating_poses.empty()) p.sections.push_back(telling_section(d));
   if (d.residuals_before.size() == rows.size() && d.residuals_after.size() == rows.size()) {
     PagePoses set = page_poses(d.residuals_before, d.residuals_after, rows, d.outliers, false);
     set.title = "Poses that were fitted";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Text that comes from files and people, made safe for HTML: element content and attributes.
 #ifndef FLEXCOMP_HOST_REPORT_ESCAPE_HPP

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/models.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -59,7 +60,7 @@ std::vector<double> lengths(const std::vector<RowResidual>& errors) {
 
 }  // namespace
 
-std::vector<ModelFit> compare_models(const RobotFile& robot, const std::vector<Observation>& rows,
+std::vector<ModelFit> compare_models(const Robot& robot, const std::vector<Observation>& rows,
                                      const std::string& source, const IdentifyOptions& options) {
   std::vector<ModelFit> list;
   for (const ModelKind kind :

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The paper's comparison of models (Chen et al. 2019, Fig. 3 and Fig. 10): each fitted to the same rows, and judged on rows
 /// that it was not fitted to.
@@ -30,7 +31,7 @@ struct ModelFit {
 /// Rows are left out by the hat matrix: the residual without row i is (1 - H_ii)^-1 e_i, with H_ii = J_i (J^T J)^-1 J_i^T of
 /// the whitened, weighted derivative J (Cook and Weisberg 1982, Section 2.2; exact for a linear model, which the arm is over
 /// the size of its errors).
-std::vector<ModelFit> compare_models(const RobotFile& robot, const std::vector<Observation>& rows,
+std::vector<ModelFit> compare_models(const Robot& robot, const std::vector<Observation>& rows,
                                      const std::string& source, const IdentifyOptions& options);
 
 /// "rigid-flexible", "without link gravity" …

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// One self-contained page about a calibration, without network; light, dark and on paper. Text, tables and drawings
 /// (inline SVG) are made here and can be read without scripts; the script that the page carries (report/web) adds the arm
@@ -12,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "files/calibration_file.hpp"
-#include "files/cell_file.hpp"
-#include "files/robot_file.hpp"
+#include "model/calibration.hpp"
+#include "model/cell.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 
@@ -111,7 +112,7 @@ struct Page {
   std::string title;                ///< "Calibration of staubli-tx60l"
   std::string summary;              ///< what came out, in a sentence or two for somebody in a hurry
   std::vector<std::string> doubts;  ///< why the result must not be relied on; shown first, in words
-  std::optional<RobotFile> arm;     ///< drawn in 3-D with the poses below
+  std::optional<Robot> arm;         ///< drawn in 3-D with the poses below
   std::vector<PageFact> facts;      ///< data file, poses, parameters, condition, chi-square per dof …
   std::optional<PagePlan> plan;
   std::vector<PagePoses> poses;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/parameters.hpp"
 
 #include <Eigen/Geometry>
@@ -7,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "catalogue/catalogue.hpp"
+#include "model/effects.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -41,7 +42,7 @@ void add_frames(Page& page, const Calibration& calibration) {
 
 }  // namespace
 
-void add_parameters(Page& page, const Calibration& calibration, const RobotFile& robot) {
+void add_parameters(Page& page, const Calibration& calibration, const Robot& robot) {
   for (const Parameter& p : parameters_of(calibration.terms, robot.nominal)) {
     PageParameter shown;
     shown.name = p.name;

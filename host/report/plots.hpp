@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The plots of a page as inline SVG. Colours come from the page's style sheet by class, so that one drawing serves
 /// light, dark and paper. Of very many poses a part is drawn (shown_poses()), so that a page stays small. Drawn for the width of a phone; wider screens put several beside each other.

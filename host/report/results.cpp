@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/results.hpp"
 
 #include <fmt/format.h>
@@ -79,7 +80,7 @@ PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<R
   return set;
 }
 
-Page titled_page(const std::string& title, const RobotFile& robot) {
+Page titled_page(const std::string& title, const Robot& robot) {
   Page page;
   page.title = title;
   page.arm = robot;
@@ -163,7 +164,7 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
 
 }  // namespace
 
-Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Identification& r, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::vector<ModelFit>& compared, bool without_priors) {
   Page p = titled_page("Identification of " + robot.name, robot);
   p.summary =
@@ -189,11 +190,11 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   if (!compared.empty()) p.further.push_back(models_section(compared, without_priors));
   add_parameters(p, r.calibration, robot);
   p.missing = r.known.missing;
-  for (const CuringPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
+  for (const SuggestedPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
   return p;
 }
 
-Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Validation& v, const std::vector<Observation>& rows, const Robot& robot,
              const Calibration& calibration, const std::string& data) {
   Page p = titled_page("Validation of " + robot.name, robot);
   p.summary = gained(statistics(v.nominal, rows), v.after);

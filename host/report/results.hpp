@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Pages of what `identify`, `validate` and `diagnose` found.
 #ifndef FLEXCOMP_HOST_REPORT_RESULTS_HPP
@@ -18,17 +19,17 @@ namespace flexcomp::host {
 
 /// \param compared        compare_models(), or none
 /// \param without_priors  the run fixed parameters or had tolerances, which compare_models() drops
-Page page_of(const Identification& r, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Identification& r, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::vector<ModelFit>& compared, bool without_priors = false);
-Page page_of(const Validation& v, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Validation& v, const std::vector<Observation>& rows, const Robot& robot,
              const Calibration& calibration, const std::string& data);
 
 /// \param others  rows that were kept out, where there are any
-Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const RobotFile& robot,
+Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::optional<HeldOut>& others);
 
 /// What pages of results have in common: a page with its title and who made it when, and the rows as poses of a page.
-Page titled_page(const std::string& title, const RobotFile& robot);
+Page titled_page(const std::string& title, const Robot& robot);
 PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
                      const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers,
                      bool frames_fitted);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Which of very many poses are drawn.
 #ifndef FLEXCOMP_HOST_REPORT_SHOWN_POSES_HPP

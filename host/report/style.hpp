@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The style sheet of a page: light, dark, phone and paper.
 #ifndef FLEXCOMP_HOST_REPORT_STYLE_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The script and style sheet of the page's interactive parts. Made by the build from report/web and the npm packages that
 /// its lock file names; empty where the program was configured with FLEXCOMP_REPORT_WEB=OFF.

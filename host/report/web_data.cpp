@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/web_data.hpp"
 
 #include <fmt/format.h>
@@ -71,7 +72,7 @@ Json bodies(const std::vector<Capsule>& capsules) {
   return list;
 }
 
-Json arm_json(const RobotFile& robot) {
+Json arm_json(const Robot& robot) {
   Json arm{{"name", robot.name}, {"links", Json::array()}, {"capsules", bodies(robot.capsules)}};
   for (const NominalLink& l : robot.nominal.links)
     arm["links"].push_back({l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad});

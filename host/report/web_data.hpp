@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The numbers of a page for its script.
 #ifndef FLEXCOMP_HOST_REPORT_WEB_DATA_HPP

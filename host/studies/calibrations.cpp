@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "studies/calibrations.hpp"
 
 #include <Eigen/Dense>
@@ -13,7 +14,7 @@
 #include "flexcomp/forward.hpp"
 #include "identification/estimator.hpp"
 #include "identification/identifiability.hpp"
-#include "identification/knowable.hpp"
+#include "identification/parameter_selection.hpp"
 
 namespace flexcomp::host {
 
@@ -75,7 +76,7 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
   all.parameters = paper.parameters;
   all.prior =
       prior_knowledge(paper.set, all.parameters, options.method == Estimation::ours, options.tolerances);
-  const Knowable known = what_is_knowable(arm.robot, clean_, start_, all, structure_seed);
+  const Identifiability known = analyse_identifiability(arm.robot, clean_, start_, all, structure_seed);
   missing_ = known.missing;
   unknowns_ = known.fitted;
   if (options.insist) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Calibrations repeated with fresh noise: what a study counts.
 #ifndef FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
@@ -10,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
 #include "files/tolerance_file.hpp"
 #include "identification/residuals.hpp"
 #include "measurement/noise_level.hpp"
 #include "measurement/observation.hpp"
+#include "model/effects.hpp"
 #include "studies/paper.hpp"
 
 namespace flexcomp::host {

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fig. 2: 30 random poses, Table 1's joint angle deviations alone and link length deviations alone.
 #include <fmt/format.h>
 
-#include "catalogue/host_model.hpp"
 #include "flexcomp/forward.hpp"
+#include "model/host_model.hpp"
 #include "studies/calibrations.hpp"
 #include "studies/study.hpp"
 

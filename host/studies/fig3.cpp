@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fig. 3: 14 random poses without noise, the geometric parameters as four models identify them.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fig. 4: 14 random poses with noise; the pose model and the position model, orientations varied and settled.
 #include <fmt/format.h>
 

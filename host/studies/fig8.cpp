@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fig. 8: 14 planned poses and M-LM against DETMAX and least squares, each crossed with the other, and what raises the
 // limit honestly.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "studies/paper.hpp"
 
 #include <fmt/format.h>
@@ -5,10 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "catalogue/catalogue.hpp"
-#include "catalogue/host_model.hpp"
+#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
+#include "model/effects.hpp"
+#include "model/host_model.hpp"
 #include "studies/robot_texts.hpp"
 #include "units.hpp"
 
@@ -48,7 +50,7 @@ double table1(const Term<double>& term) {
   }
 }
 
-TermSet table1_of(const RobotFile& robot) {
+TermSet table1_of(const Robot& robot) {
   TermSet set = paper_model(robot.nominal, ModelKind::full, true).set;
   std::size_t k = 0;
   for (Term<double>& term : set.terms)

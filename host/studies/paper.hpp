@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The arms of the paper's studies with their assumed true errors (Chen et al. 2019, Table 1; model.md section 2).
 #ifndef FLEXCOMP_HOST_STUDIES_PAPER_HPP
@@ -9,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/term_set.hpp"
-#include "files/robot_file.hpp"
+#include "model/robot.hpp"
+#include "model/term_set.hpp"
 
 namespace flexcomp::host {
 
@@ -23,7 +24,7 @@ struct StudiedPose {
 /// An arm whose errors are known because they are assumed.
 struct StudiedArm {
   std::string name;  ///< TX60L
-  RobotFile robot;
+  Robot robot;
   TermSet truth;      ///< the 39 terms of Table 1
   std::string about;  ///< how the truth was made, where the paper prints none
 };

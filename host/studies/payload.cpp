@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the payload is good for: the paper says that the gain of the flexible model grows with it.
 #include <fmt/format.h>
 

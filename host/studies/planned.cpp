@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "studies/planned.hpp"
 
 #include <Eigen/Dense>
@@ -6,7 +7,7 @@
 #include <memory>
 #include <random>
 
-#include "files/cell_file.hpp"
+#include "model/cell.hpp"
 #include "planning/feasibility.hpp"
 #include "planning/planner.hpp"
 #include "planning/sapso.hpp"
@@ -58,7 +59,7 @@ PlanProblem problem_of(const StudiedArm& arm, std::size_t count, const std::vect
     problem.payloads.push_back(default_context<double>(arm.robot.nominal));
     problem.payloads.back().payload_kg = payload;
   }
-  std::vector<Sight> like;
+  std::vector<PlannedMeasurement> like;
   for (const PoseContext& context : problem.payloads) like.push_back({{}, context, problem.instrument});
   problem.information = std::make_shared<PoseInformation>(arm.robot, ModelKind::full, false, like);
   problem.limits = arm.robot.nominal.limits;

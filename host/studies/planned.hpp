@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Poses for a study as each method of planning would choose them, all in the same cell.
 #ifndef FLEXCOMP_HOST_STUDIES_PLANNED_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many poses are needed: the paper says that 14 is the least.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The paper's studies: its figure, ours, and what no unbiased estimator can better, side by side.
 #ifndef FLEXCOMP_HOST_STUDIES_STUDY_HPP

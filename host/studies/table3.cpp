@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 3, Fig. 10 and Fig. 12: what is left on 30 other poses after 14 planned ones, with three models.
 #include <fmt/format.h>
 

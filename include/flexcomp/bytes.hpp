@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Little-endian bytes and the conversion between binary64 and the target's scalar, without soft-double
 /// arithmetic.

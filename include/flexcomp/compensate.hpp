@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Inverse compensation: the joint command that brings the flexible arm to the nominal pose of the command.
 ///
-/// Bounded work whatever the input. Where the effects of a set only turn joints (Model::only_joints_yield(), which all
+/// Bounded work whatever the input. Where the effects of a set only turn joints (Model::has_only_joint_deflections(), which all
 /// sets of the paper's model are), the arm is a rigid chain behind joints that yield, and each is solved for itself:
 ///
 /// 1. The nominal chain gives the pose to be reached and the Jacobian J. What the constant terms do to this pose is
@@ -24,10 +25,10 @@
 #include <cmath>
 #include <cstddef>
 
-#include "flexcomp/corrector.hpp"
+#include "flexcomp/detail/damped_jacobian_solver.hpp"
+#include "flexcomp/detail/joint_deflection.hpp"
+#include "flexcomp/detail/rigid_chain.hpp"
 #include "flexcomp/forward.hpp"
-#include "flexcomp/joint_yield.hpp"
-#include "flexcomp/rigid_chain.hpp"
 
 namespace flexcomp {
 
@@ -69,20 +70,20 @@ inline bool is_finite_context(const Context<S, N>& c) {
 /// Where the flange and the tool point of the chain with constant terms are to be, in F0: the nominal pose
 /// without B and without the tool's constant terms.
 template <class S>
-struct Aim {
+struct FlangeTarget {
   FlangePose<S> flange;
-  Triple<S> tool_point;
+  Vec3<S> tool_point;
 };
 
 /// Turns the nominal pose, with which `aim` comes, into that.
 template <class S, std::size_t N, class Cap>
-inline void take_aim(const Model<S, N, Cap>& model, Aim<S>& aim) {
-  ThreeTriples<S>& axes = aim.flange.axes;
+inline void flange_target(const Model<S, N, Cap>& model, FlangeTarget<S>& aim) {
+  Mat3<S>& axes = aim.flange.axes;
   if (model.turns_tool()) {
-    const ThreeTriples<S> nominal = axes;
+    const Mat3<S> nominal = axes;
     int k = 0;
-    for (Triple<S>* v : {&axes.a, &axes.b, &axes.c}) {
-      const Triple<S> turn = triple<S>(model.tool_turn().col(k++));
+    for (Vec3<S>* v : {&axes.a, &axes.b, &axes.c}) {
+      const Vec3<S> turn = vec3<S>(model.tool_turn().col(k++));
       *v = combine(nominal, turn);
     }
   }
@@ -95,7 +96,7 @@ inline void take_aim(const Model<S, N, Cap>& model, Aim<S>& aim) {
   const S xx = b(0, 0), xy = b(1, 0), xz = b(2, 0);
   const S yx = b(0, 1), yy = b(1, 1), yz = b(2, 1);
   const S zx = b(0, 2), zy = b(1, 2), zz = b(2, 2);
-  for (Triple<S>* v : {&axes.a, &axes.b, &axes.c, &aim.tool_point}) {
+  for (Vec3<S>* v : {&axes.a, &axes.b, &axes.c, &aim.tool_point}) {
     const S x = v->x, y = v->y, z = v->z;
     v->x = xx * x + xy * y + xz * z;
     v->y = yx * x + yy * y + yz * z;
@@ -114,7 +115,7 @@ constexpr int most_yield_steps = 6;
 /// When a double or a float is accurate enough; squares of rad. `rough` and `bend` are estimates, good enough for a float
 /// to leave something out; a double shows it always.
 template <class S>
-struct Enough {
+struct Tolerance {
   static constexpr S correction = S(1e-8);   ///< of the chain: the next one is a third-order rest of it
   static constexpr S rough = S(0);           ///< what a first solution of the linear problem leaves
   static constexpr S refinement = S(2e-20);  ///< what the next refinement would be
@@ -122,7 +123,7 @@ struct Enough {
   static constexpr S yield_step = S(6e-20);  ///< what the next evaluation of the yield would change
 };
 template <>
-struct Enough<float> {
+struct Tolerance<float> {
   static constexpr float correction = 1e-6F;
   static constexpr float rough = 2.5e-13F;
   static constexpr float refinement = 1e-14F;
@@ -134,25 +135,26 @@ struct Enough<float> {
 /// psi is solved for first, without loads, and then q from it. `angle` comes with the nominal offsets, `aim` as the
 /// nominal pose itself.
 template <class S, std::size_t N, class Cap>
-inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, const Context<S, N>& context,
-                                    std::array<SinCos<S>, N>& angle, Corrector<S, N>& corrector,
+inline void correct_yielding_joints(const Model<S, N, Cap>& model, FlangeTarget<S>& aim,
+                                    const Context<S, N>& context, std::array<SinCos<S>, N>& angle,
+                                    DampedJacobianSolver<S, N>& corrector,
                                     const CompensationSettings<S>& settings, std::array<S, N>& q) {
   const S largest = settings.largest_correction_rad;
   std::array<S, N> dq;
-  Twist<S> move;
+  SmallMotion<S> move;
   // First what the constant terms do to the nominal chain, to first order.
   constant_twist(model, angle, move);
   {
-    const Twist<S>& base = model.base_twist();
-    const Triple<S> turn = {-move.angular.x - base.angular.x, -move.angular.y - base.angular.y,
-                            -move.angular.z - base.angular.z};
+    const SmallMotion<S>& base = model.base_twist();
+    const Vec3<S> turn = {-move.angular.x - base.angular.x, -move.angular.y - base.angular.y,
+                          -move.angular.z - base.angular.z};
     const S tx = aim.tool_point.x, ty = aim.tool_point.y, tz = aim.tool_point.z;
-    const Triple<S> shift = {turn.y * tz - turn.z * ty - move.linear.x - base.linear.x,
-                             turn.z * tx - turn.x * tz - move.linear.y - base.linear.y,
-                             turn.x * ty - turn.y * tx - move.linear.z - base.linear.z};
+    const Vec3<S> shift = {turn.y * tz - turn.z * ty - move.linear.x - base.linear.x,
+                           turn.z * tx - turn.x * tz - move.linear.y - base.linear.y,
+                           turn.x * ty - turn.y * tx - move.linear.z - base.linear.z};
     corrector.solve(shift, turn, largest, largest, dq);
   }
-  take_aim(model, aim);
+  flange_target(model, aim);
   std::array<S, N> by;
   S turned = S(0);
   FLEXCOMP_UNROLL
@@ -167,52 +169,51 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
 
   const bool loaded = model.yields_to_loads();
   const bool direct = model.own_count() + model.other_count() != 0;
-  CarriedLoad<S> load;
+  StaticLoad<S> load;
   std::array<S, N> yield;
   if (loaded) carried_load(model, context, load);
   std::array<JointAxis<S>, N> joints;
   FlangePose<S> flange;
-  YieldAround<S, N> around;
+  LinearisedDeflection<S, N> around;
   bool fresh = false;
   int k = 1;
   for (;; ++k) {
     rigid_pass(model.shapes(), angle, joints, flange);
-    Triple<S> point;
-    flange_point(flange, triple<S>(model.tool_pose().position), point);
+    Vec3<S> point;
+    flange_point(flange, vec3<S>(model.tool_pose().position), point);
     if (k == 1 && loaded) {
       if (load.is_plain) {
         around.set(model, q, joints, flange, load, yield);
       } else {
         // At the joint's angle instead of its reading: off by itself times its slope.
-        loaded_yield(model, q, angle, load, yield);
+        load_deflection(model, q, angle, load, yield);
       }
     }
-    const Triple<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y,
-                             aim.tool_point.z - point.z};
-    Triple<S> turn;
+    const Vec3<S> shift = {aim.tool_point.x - point.x, aim.tool_point.y - point.y,
+                           aim.tool_point.z - point.z};
+    Vec3<S> turn;
     rotation_error(aim.flange.axes, flange.axes, turn);
     const S largest_turn = largest * allowed_turn<S>(k);
     // Beside a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some
     // percent: from there on it is the one close to the solution.
-    if (k == 1 && (corrector.gave_up() || corrector.is_worn_by(turned))) {
+    if (k == 1 && (corrector.is_damped() || corrector.jacobian_is_stale(turned))) {
       corrector.joints() = joints;
       corrector.set(point, settings);
       fresh = true;
     }
     S square = corrector.solve(shift, turn, largest, largest_turn, dq);
     // The factored Jacobian is off by about the turn over the smallest singular value, and the correction with it.
-    bool done = fresh || turned * square <= Enough<S>::rough * corrector.regular();
+    bool done = fresh || turned * square <= Tolerance<S>::rough * corrector.regular();
     for (int n = 0; n < most_refinements && !done; ++n) {
       // The factored Jacobian is the nominal arm's, off by some 1e-2: what it leaves is solved for again, the second
       // order of the motion with it.
       motion(joints, point, dq, move);
-      const Triple<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y,
-                                    shift.z - move.linear.z};
-      const Triple<S> turn_left = {turn.x - move.angular.x, turn.y - move.angular.y, turn.z - move.angular.z};
+      const Vec3<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y, shift.z - move.linear.z};
+      const Vec3<S> turn_left = {turn.x - move.angular.x, turn.y - move.angular.y, turn.z - move.angular.z};
       std::array<S, N> rest;
       const S left = corrector.solve(shift_left, turn_left, largest, largest_turn, rest);
       // Each of them leaves the same part of the one before.
-      done = left * left <= Enough<S>::refinement * square;
+      done = left * left <= Tolerance<S>::refinement * square;
       square = S(0);
       FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
@@ -225,7 +226,8 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
     for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
     if (k == most_corrections - 1) break;
     // Where something is given up the last correction decides how much, so there it is never left out.
-    if (done && !corrector.gave_up() && square <= (fresh ? S(0.02) : S(1)) * Enough<S>::correction) break;
+    if (done && !corrector.is_damped() && square <= (fresh ? S(0.02) : S(1)) * Tolerance<S>::correction)
+      break;
     rotate_all(angle, dq, square);
   }
   if (!loaded && !direct) return;
@@ -258,13 +260,13 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
   S square = square_of(dq);
   if (loaded && load.is_plain && k == 1 && model.other_count() == 0 && model.other_loaded_count() == 0) {
     // From this one chain the change above leaves out a wave's bend, of the wave's own size.
-    if (square_of(yield) * square * square <= Enough<S>::bend) return;
+    if (square_of(yield) * square * square <= Tolerance<S>::bend) return;
   }
   for (int n = 0; n < most_yield_steps; ++n) {
     std::array<S, N> now;
     if (loaded) {
       rotate_all(angle, dq, square);
-      loaded_yield(model, q, angle, load, now);
+      load_deflection(model, q, angle, load, now);
     } else {
       for (S& y : now) y = S(0);
     }
@@ -282,26 +284,26 @@ inline void correct_yielding_joints(const Model<S, N, Cap>& model, Aim<S>& aim, 
       square += step * step;
     }
     // What this step leaves is smaller by the slope, and the yield is a wave of some rad: its slope is like its size.
-    if (square * size <= Enough<S>::yield_step) break;
+    if (square * size <= Tolerance<S>::yield_step) break;
   }
 }
 
 /// For all other sets: the forward model with its two passes, three times; Newton, Newton, chord.
 template <class S, std::size_t N, class Cap>
-inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, const Context<S, N>& context,
-                        const CompensationSettings<S>& settings, Corrector<S, N>& corrector,
-                        std::array<S, N>& q) {
+inline void correct_general(const Model<S, N, Cap>& model, const Pose<S>& target,
+                            const Context<S, N>& context, const CompensationSettings<S>& settings,
+                            DampedJacobianSolver<S, N>& corrector, std::array<S, N>& q) {
   Workspace<S, N> ws;
   ws.q = q;
   for (std::size_t i = 0; i < N; ++i) ws.reading[i] = sin_cos(q[i]);
   const S largest = settings.largest_correction_rad;
   for (int k = 0; k < most_corrections; ++k) {
     const Pose<S> pose = evaluate(model, context, ws);
-    Triple<S> position = triple<S>(target.position) - triple<S>(pose.position);
-    Triple<S> orientation;
+    Vec3<S> position = vec3<S>(target.position) - vec3<S>(pose.position);
+    Vec3<S> orientation;
     rotation_error(columns_of(target.rotation), columns_of(pose.rotation), orientation);
     if (model.has_base()) {
-      const ThreeTriples<S> b = columns_of(model.base_pose().rotation);
+      const Mat3<S> b = columns_of(model.base_pose().rotation);
       position = {dot(b.a, position), dot(b.b, position), dot(b.c, position)};
       orientation = {dot(b.a, orientation), dot(b.b, orientation), dot(b.c, orientation)};
     }
@@ -309,9 +311,9 @@ inline void correct_any(const Model<S, N, Cap>& model, const Pose<S>& target, co
       // The first correction can turn the wrist by 20 mrad near a singularity, which changes the Jacobian by
       // some percent: from here on the chord is the deflected chain's own, close to the solution.
       for (std::size_t i = 0; i < N; ++i)
-        corrector.joints()[i] = {triple<S>(ws.frames.axis(i, 2)), triple<S>(ws.frames.origin[i])};
-      const Triple<S> tool = triple<S>(model.tool_pose().position);
-      corrector.set(triple<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool),
+        corrector.joints()[i] = {vec3<S>(ws.frames.axis(i, 2)), vec3<S>(ws.frames.origin[i])};
+      const Vec3<S> tool = vec3<S>(model.tool_pose().position);
+      corrector.set(vec3<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool),
                     settings);
     }
     std::array<S, N> dq;
@@ -349,19 +351,19 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   const S largest = settings.largest_correction_rad;
   std::array<SinCos<S>, N> angle;
   detail::sin_cos_all(q_command, model.nominals(), angle);
-  detail::Corrector<S, N> corrector;
-  detail::Aim<S> aim;
+  detail::DampedJacobianSolver<S, N> corrector;
+  detail::FlangeTarget<S> aim;
   detail::rigid_pass(model.nominals(), angle, corrector.joints(), aim.flange);
-  detail::flange_point(aim.flange, triple<S>(model.nominal_tool().position), aim.tool_point);
+  detail::flange_point(aim.flange, vec3<S>(model.nominal_tool().position), aim.tool_point);
   corrector.set(aim.tool_point, settings);
   std::array<S, N> q;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
-  if (model.only_joints_yield()) {
+  if (model.has_only_joint_deflections()) {
     detail::correct_yielding_joints(model, aim, context, angle, corrector, settings, q);
   } else {
     const Pose<S> target = nominal_forward(model, q_command);
-    detail::correct_any(model, target, context, settings, corrector, q);
+    detail::correct_general(model, target, context, settings, corrector, q);
   }
   // Effects beyond all bounds end here, as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);
@@ -371,7 +373,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
     square += change * change;
   }
   if (!(square < S(1e8))) return refuse();
-  out.status = corrector.gave_up() ? StepStatus::near_singular : StepStatus::ok;
+  out.status = corrector.is_damped() ? StepStatus::near_singular : StepStatus::ok;
   if (square > largest * largest) {
     std::array<S, N> change;
     for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
@@ -419,7 +421,7 @@ inline TargetResidual<S> target_residual(const Model<S, N, Cap>& model, const st
   Workspace<S, N> ws;
   const Pose<S> pose = forward(model, q, context, ws);
   const Vector3<S> p = target.position - pose.position;
-  Triple<S> r;
+  Vec3<S> r;
   detail::rotation_error(columns_of(target.rotation), columns_of(pose.rotation), r);
   using std::sqrt;
   return {sqrt(dot<S>(p, p)), sqrt(dot(r, r))};

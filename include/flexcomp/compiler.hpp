@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the core asks of the compiler beyond the language. Both are only about speed and size.
 #ifndef FLEXCOMP_COMPILER_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// CRC-32 of IEEE 802.3 (reflected, 0xEDB88320, init and final XOR all ones; "123456789" -> 0xCBF43926).
 #ifndef FLEXCOMP_CRC32_HPP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The rigid-flexible forward model (Chen et al. 2019, Eq. 1 and 10-22, as read in terms on slots).
 ///
@@ -223,7 +224,7 @@ template <class S, std::size_t N>
 FLEXCOMP_ONCE S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
                           const Context<S, N>& context) {
   switch (kind) {
-    case Covariate::reading:
+    case Covariate::joint_position:
       return q[joint];
     case Covariate::payload:
       return context.payload_kg;
@@ -273,7 +274,7 @@ inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, c
   switch (term.basis) {
     case Basis::one:
       return S(1);
-    case Basis::reading:
+    case Basis::joint_position:
       return q[j];
     case Basis::sine:
       return sin_cos(term.argument * q[j]).s;

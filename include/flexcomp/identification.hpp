@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Identification columns (Chen et al. 2019, Eq. 7-9 and 17-23) read from the same terms as the forward
 /// model: column = unit screw of the place, carried to the tool point, times the basis.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The parameter image: terms as bytes, bound to one robot. The same bytes travel over every bus and lie in
 /// every slot. All numbers are little-endian, reals are binary64 in SI units.

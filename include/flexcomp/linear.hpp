@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Fixed-size vectors, rotations and poses. Nothing here allocates: only 3-vectors, 3x3 matrices and
 /// 6-vectors; and triples of scalars for what runs in every control cycle.
@@ -61,48 +62,48 @@ inline Pose<S> operator*(const Pose<S>& outer, const Pose<S>& inner) {
 
 /// Three scalars and nothing else: an expression template would go through memory here.
 template <class S>
-struct Triple {
+struct Vec3 {
   S x, y, z;
 };
 
 template <class S>
-inline Triple<S> operator+(const Triple<S>& a, const Triple<S>& b) {
+inline Vec3<S> operator+(const Vec3<S>& a, const Vec3<S>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class S>
-inline Triple<S> operator-(const Triple<S>& a, const Triple<S>& b) {
+inline Vec3<S> operator-(const Vec3<S>& a, const Vec3<S>& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class S>
-inline Triple<S> operator*(const Triple<S>& a, const S& k) {
+inline Vec3<S> operator*(const Vec3<S>& a, const S& k) {
   return {a.x * k, a.y * k, a.z * k};
 }
 template <class S>
-inline Triple<S> cross(const Triple<S>& a, const Triple<S>& b) {
+inline Vec3<S> cross(const Vec3<S>& a, const Vec3<S>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class S>
-inline S dot(const Triple<S>& a, const Triple<S>& b) {
+inline S dot(const Vec3<S>& a, const Vec3<S>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class S>
-inline Triple<S> triple(const Vector3<S>& v) {
+inline Vec3<S> vec3(const Vector3<S>& v) {
   return {v[0], v[1], v[2]};
 }
 
 /// Rows or columns of a 3x3 matrix, as the name of the variable says.
 template <class S>
-struct ThreeTriples {
-  Triple<S> a, b, c;
+struct Mat3 {
+  Vec3<S> a, b, c;
 };
 
 /// Columns times a vector.
 template <class S>
-inline Triple<S> combine(const ThreeTriples<S>& columns, const Triple<S>& v) {
+inline Vec3<S> combine(const Mat3<S>& columns, const Vec3<S>& v) {
   return columns.a * v.x + columns.b * v.y + columns.c * v.z;
 }
 template <class S>
-inline ThreeTriples<S> columns_of(const Matrix3<S>& m) {
+inline Mat3<S> columns_of(const Matrix3<S>& m) {
   return {{m(0, 0), m(1, 0), m(2, 0)}, {m(0, 1), m(1, 1), m(2, 1)}, {m(0, 2), m(1, 2), m(2, 2)}};
 }
 

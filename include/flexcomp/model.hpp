@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The prepared model: nominal chain + terms, with every constant term folded in once. Build it with begin(),
 /// add_table(), add(), finish(); afterwards it is only read. Evaluation is in forward.hpp.
@@ -44,9 +45,9 @@ struct LinkShape {
 
 /// A small rigid motion: of the point at the origin of its frame (m) and about it (rad).
 template <class S>
-struct Twist {
-  Triple<S> linear;
-  Triple<S> angular;
+struct SmallMotion {
+  Vec3<S> linear;
+  Vec3<S> angular;
 };
 
 /// Rigid transform of six small values: Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and rad.
@@ -278,7 +279,7 @@ class Model {
   const std::array<LinkShape<S>, N>& shapes() const { return shape_; }
   /// True where every effect turns a joint (slot theta of a link) by the load's torque, the links' own weight, or
   /// something that needs no frames. Then the arm is a rigid chain behind yielding joints.
-  bool only_joints_yield() const { return only_joints_yield_; }
+  bool has_only_joint_deflections() const { return only_joints_yield_; }
   /// True where some effect follows the load's torque or a lever.
   bool yields_to_loads() const { return yields_to_loads_; }
   /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
@@ -300,11 +301,11 @@ class Model {
   const Matrix3<S>& tool_turn() const { return tool_turn_; }
   /// What the constant terms of link i do, seen from the frame after it and to first order; the last one with what the
   /// tool's do.
-  const Twist<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
+  const SmallMotion<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
   /// Constant part of the offset of joint i, rad.
   S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }
   /// What B does, in Fb at its origin.
-  const Twist<S>& base_twist() const { return base_twist_; }
+  const SmallMotion<S>& base_twist() const { return base_twist_; }
 
  private:
   bool reads_direction(const Term<S>& t) const {
@@ -339,7 +340,7 @@ class Model {
       case Basis::curve:
         if (t.factor == Factor::load_torque) return other_loaded;
         return of_itself ? own : other;
-      case Basis::reading:
+      case Basis::joint_position:
       case Basis::sine:
       case Basis::cosine:
         return of_itself ? own : other;
@@ -395,18 +396,18 @@ class Model {
     }
   }
   /// The motion that takes the first pose's frame into the second one's, in the first frame and to first order.
-  static Twist<S> twist_between(const Pose<S>& from, const Pose<S>& to) {
+  static SmallMotion<S> twist_between(const Pose<S>& from, const Pose<S>& to) {
     const Matrix3<S>& r = from.rotation;
-    const Triple<S> shift = triple<S>(to.position) - triple<S>(from.position);
-    const auto into = [&r](const Triple<S>& v) {
-      return Triple<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z,
-                       r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
-                       r(0, 2) * v.x + r(1, 2) * v.y + r(2, 2) * v.z};
+    const Vec3<S> shift = vec3<S>(to.position) - vec3<S>(from.position);
+    const auto into = [&r](const Vec3<S>& v) {
+      return Vec3<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z,
+                     r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
+                     r(0, 2) * v.x + r(1, 2) * v.y + r(2, 2) * v.z};
     };
-    Triple<S> turn = {S(0), S(0), S(0)};
+    Vec3<S> turn = {S(0), S(0), S(0)};
     for (int k = 0; k < 3; ++k) {
-      turn = turn + cross(Triple<S>{r(0, k), r(1, k), r(2, k)},
-                          Triple<S>{to.rotation(0, k), to.rotation(1, k), to.rotation(2, k)});
+      turn = turn + cross(Vec3<S>{r(0, k), r(1, k), r(2, k)},
+                          Vec3<S>{to.rotation(0, k), to.rotation(1, k), to.rotation(2, k)});
     }
     return {into(shift), into(turn * S(0.5))};
   }
@@ -428,12 +429,12 @@ class Model {
                                      still_link(shape_[i], sin_cos(constant_[i][slot::theta])));
     }
     // The tool's motion is seen from the flange, where the last link's is.
-    const Twist<S> tool = twist_between(nominal_tool_, tool_pose_);
-    const ThreeTriples<S> turned = columns_of(nominal_tool_.rotation);
-    const Triple<S> angular = combine(turned, tool.angular);
-    Twist<S>& last = link_twist_[N - 1];
+    const SmallMotion<S> tool = twist_between(nominal_tool_, tool_pose_);
+    const Mat3<S> turned = columns_of(nominal_tool_.rotation);
+    const Vec3<S> angular = combine(turned, tool.angular);
+    SmallMotion<S>& last = link_twist_[N - 1];
     last.linear =
-        last.linear + combine(turned, tool.linear) + cross(triple<S>(nominal_tool_.position), angular);
+        last.linear + combine(turned, tool.linear) + cross(vec3<S>(nominal_tool_.position), angular);
     last.angular = last.angular + angular;
     base_twist_ = twist_between(Pose<S>(), base_pose_);
   }
@@ -475,8 +476,8 @@ class Model {
   bool turns_tool_ = false;
   std::array<S, N> compliance_{};
   S inverse_gravity_ = S(0);
-  std::array<Twist<S>, N> link_twist_{};
-  Twist<S> base_twist_{};
+  std::array<SmallMotion<S>, N> link_twist_{};
+  SmallMotion<S> base_twist_{};
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
   std::array<Count, groups> group_end_{};
   std::array<Count, Cap::terms> order_{};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The nominal robot: what the maker's drawing says. All of it in double on every target (data, not
 /// arithmetic), so that its hash is the same wherever it is taken.

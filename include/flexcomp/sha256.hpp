@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// SHA-256 (FIPS 180-4) without a heap, for the nominal hash: the controller hashes the geometry that it
 /// really runs. Signatures are not made with this; the host uses OpenSSL.

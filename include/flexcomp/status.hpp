@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Outcomes of the core. Every function that can refuse returns one; nothing throws.
 #ifndef FLEXCOMP_STATUS_HPP

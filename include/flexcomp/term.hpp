@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// One idea carries everything: place x basis x coefficient. A term says where in the chain an error acts,
 /// what it is proportional to, and how much.
@@ -56,7 +57,7 @@ enum class Basis : std::uint8_t {
   load_torque = 1,        ///< tau_joint, N·m: torque of payload and external force about the joint's axis
   load_torque_cubed = 2,  ///< tau_joint^3
   link_weight = 3,     ///< lever s of the link of `joint` (effects.md); `argument` = joint of the far point
-  reading = 4,         ///< q_joint, rad
+  joint_position = 4,  ///< q_joint, rad
   sine = 5,            ///< sin(argument * q_joint)
   cosine = 6,          ///< cos(argument * q_joint)
   direction = 7,       ///< -direction_joint: the link stays behind the motion
@@ -83,7 +84,7 @@ enum class Factor : std::uint8_t {
 
 /// The variable along one side of a grid: a kind, and a joint where the kind needs one.
 enum class Covariate : std::uint8_t {
-  reading = 0,         ///< q_joint, rad
+  joint_position = 0,  ///< q_joint, rad
   payload = 1,         ///< kg
   temperature = 2,     ///< deg C
   time = 3,            ///< s
@@ -139,8 +140,8 @@ struct Table {
   std::uint16_t size = 0;
   std::uint16_t rows = 0;     ///< grid: nodes of the first side, 0 for a curve
   std::uint16_t columns = 0;  ///< grid: nodes of the second side
-  Covariate row_covariate = Covariate::reading;
-  Covariate column_covariate = Covariate::reading;
+  Covariate row_covariate = Covariate::joint_position;
+  Covariate column_covariate = Covariate::joint_position;
   std::uint8_t row_joint = 0;
   std::uint8_t column_joint = 0;
 };

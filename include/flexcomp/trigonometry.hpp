@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// One sine and cosine for every target, so that host and controller agree to the last bit.
 ///

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Identification columns against dual numbers (Ceres' Jets) through the templated forward model.
 #include <ceres/jet.h>
 

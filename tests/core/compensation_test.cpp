@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Inverse compensation: exact where the arm is regular; continuous, bounded and within limits everywhere.
 #include <flexcomp/compensate.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every effect of effects.md through the core's terms, against plain matrices that share no code with it.
 #include <algorithm>
 #include <cmath>
@@ -89,9 +90,9 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
   for (const auto& x : t.readout_lag)
     set.add(place(x.joint, slot::theta), Basis::relative_speed, x.rad, index(x.joint));
   for (const auto& x : t.encoder_scale)
-    set.add(place(x.joint, slot::theta), Basis::reading, x.gain, index(x.joint));
+    set.add(place(x.joint, slot::theta), Basis::joint_position, x.gain, index(x.joint));
   for (const auto& x : t.joint_coupling)
-    set.add(place(x.joint, slot::theta), Basis::reading, x.gain, index(x.from));
+    set.add(place(x.joint, slot::theta), Basis::joint_position, x.gain, index(x.from));
   for (const auto& x : t.axis_wobble) {
     set.add(place(x.joint, slot::alpha), Basis::sine, x.alpha_sin, index(x.joint), x.order);
     set.add(place(x.joint, slot::alpha), Basis::cosine, x.alpha_cos, index(x.joint), x.order);
@@ -125,7 +126,7 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
     for (std::uint8_t k = 0; k < 3; ++k) set.add(on_point(k), Basis::step, x.shift[k], 0, x.after_s);
   for (const auto& x : t.grid) {
     const std::uint16_t table = set.add_grid(x.rows, x.columns, x.values);
-    set.tables.back().row_covariate = flexcomp::Covariate::reading;
+    set.tables.back().row_covariate = flexcomp::Covariate::joint_position;
     set.tables.back().row_joint = static_cast<std::uint8_t>(x.row_joint - 1);
     set.tables.back().column_covariate = flexcomp::Covariate::payload;
     set.add(place(x.joint, slot::theta), Basis::grid, 1.0).table = table;

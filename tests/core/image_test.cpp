@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parameter image as an adversary would send it, and the arithmetic that it rests on.
 #include <flexcomp/compensate.hpp>
 #include <flexcomp/image.hpp>
@@ -383,9 +384,9 @@ TEST(Image, MoreThanTheModelHoldsIsRefused) {
   // Constant terms cost nothing, however many; effects count.
   TermSet<double> set;
   for (std::size_t k = 0; k < 500; ++k) set.add({1, 0}, Basis::one, 1e-6);
-  for (std::size_t k = 0; k < Capacity::terms; ++k) set.add({1, 0}, Basis::reading, 1e-6);
+  for (std::size_t k = 0; k < Capacity::terms; ++k) set.add({1, 0}, Basis::joint_position, 1e-6);
   EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::none);
-  set.add({1, 0}, Basis::reading, 1e-6);
+  set.add({1, 0}, Basis::joint_position, 1e-6);
   EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::too_many_terms);
 
   TermSet<double> tables;

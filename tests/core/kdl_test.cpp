@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rigid forward model and its Jacobian against KDL, which shares no code with the core.
 #include <kdl/chain.hpp>
 #include <kdl/chainfksolverpos_recursive.hpp>

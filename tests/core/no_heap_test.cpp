@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The core never asks for memory: counted at malloc itself, not at what calls it.
 #include <cstddef>
 #include <cstdlib>

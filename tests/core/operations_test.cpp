@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The floor under the instruction budget: how many floating-point operations a step of compensation needs, counted by a
 // scalar that counts. Moves, loads and the control cycle's own work are not in it.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One sine and cosine for every target, against the long double of the C library.
 #include <flexcomp/trigonometry.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the control cycle computes in its own way, against the forward model that everything else uses: torques and
 // levers carried through the links' frames, curves in powers, first-order motions; and the way of sets whose effects
 // only turn joints against the way of all other sets.
@@ -59,18 +60,18 @@ TEST(Yield, TorquesAndLeversAreThoseOfTheForwardModel) {
     const arms::TermSet<double> set = loaded_terms(arm, random);
     Model<double> model;
     ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-    ASSERT_TRUE(model.only_joints_yield());
+    ASSERT_TRUE(model.has_only_joint_deflections());
     for (int n = 0; n < 20000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
       flexcomp::Context<double, 6> context = arms::random_context(arm.robot, random);
       if (n % 2 == 0) context.force_n = {0, 0, 0};
       flexcomp::Workspace<double> ws;
       flexcomp::forward(model, q, context, ws);
-      detail::CarriedLoad<double> load;
+      detail::StaticLoad<double> load;
       detail::carried_load(model, context, load);
       ASSERT_EQ(load.is_plain, n % 2 == 0);
       Joints yield;
-      detail::loaded_yield(model, q, angles(model, q), load, yield);
+      detail::load_deflection(model, q, angles(model, q), load, yield);
       for (std::size_t i = 0; i < 6; ++i) {
         worst = std::max(worst, std::abs(yield[i] - ws.slots.link[i][slot::theta]));
         largest = std::max(largest, std::abs(yield[i]));
@@ -90,7 +91,7 @@ TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
     Model<double> model;
     ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
     const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
-    detail::CarriedLoad<double> load;
+    detail::StaticLoad<double> load;
     detail::carried_load(model, context, load);
     ASSERT_TRUE(load.is_plain);
     for (int n = 0; n < 20000 / part; ++n) {
@@ -99,8 +100,8 @@ TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
       detail::FlangePose<double> flange;
       detail::rigid_pass(model.shapes(), angles(model, q), joints, flange);
       Joints carried, around, change, moved;
-      detail::loaded_yield(model, q, angles(model, q), load, carried);
-      detail::YieldAround<double, 6> chain;
+      detail::load_deflection(model, q, angles(model, q), load, carried);
+      detail::LinearisedDeflection<double, 6> chain;
       chain.set(model, q, joints, flange, load, around);
       for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(carried[i] - around[i]));
 
@@ -114,8 +115,8 @@ TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
       }
       chain.change(model, joints, by, change);
       Joints ahead, behind;
-      detail::loaded_yield(model, beyond, angles(model, beyond), load, ahead);
-      detail::loaded_yield(model, before, angles(model, before), load, behind);
+      detail::load_deflection(model, beyond, angles(model, beyond), load, ahead);
+      detail::load_deflection(model, before, angles(model, before), load, behind);
       for (std::size_t i = 0; i < 6; ++i) {
         moved[i] = 0.5 * (ahead[i] - behind[i]);
         worst_change = std::max(worst_change, std::abs(moved[i] - change[i]));
@@ -173,9 +174,9 @@ TEST(Yield, FirstOrderMotionsAreThoseOfTheChain) {
       std::array<flexcomp::SinCos<double>, 6> angle;
       for (std::size_t i = 0; i < 6; ++i)
         angle[i] = compose(flexcomp::sin_cos(q[i]), model.nominal(i).offset);
-      flexcomp::Twist<double> move;
+      flexcomp::SmallMotion<double> move;
       detail::constant_twist(model, angle, move);
-      const flexcomp::Twist<double>& base = model.base_twist();
+      const flexcomp::SmallMotion<double>& base = model.base_twist();
       const Eigen::Vector3d turn(move.angular.x + base.angular.x, move.angular.y + base.angular.y,
                                  move.angular.z + base.angular.z);
       const Eigen::Vector3d shift(move.linear.x + base.linear.x, move.linear.y + base.linear.y,
@@ -220,16 +221,16 @@ TEST(Yield, AllKindsOfTermsThatTurnJointsAreTakenOff) {
       const flexcomp::Place own = arms::on_link(i + 1, slot::theta);
       set.add(own, Basis::sine, random.around(1e-4), i, 2);
       set.add(own, Basis::cosine, random.around(2e-5), i, 100);
-      set.add(own, Basis::reading, random.around(2e-4), i);
+      set.add(own, Basis::joint_position, random.around(2e-4), i);
       set.add(own, Basis::direction, random.around(1e-4), i);
       set.add(own, Basis::sine, random.around(1e-4), (i + 1) % 6, 1);
-      set.add(own, Basis::reading, random.around(1e-4), (i + 5) % 6);
+      set.add(own, Basis::joint_position, random.around(1e-4), (i + 5) % 6);
     }
     set.add(arms::on_tool(slot::rx), Basis::one, 1e-3);
     set.add(arms::on_tool(slot::z), Basis::one, -1e-3);
     Model<double> model;
     ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-    ASSERT_TRUE(model.only_joints_yield());
+    ASSERT_TRUE(model.has_only_joint_deflections());
     for (const bool with_force : {false, true}) {
       const double left = left_by(arm.robot, model, random, with_force);
       std::printf("[ measured ] %s%s: %.1e m\n", arm.name, with_force ? ", force" : "", left);
@@ -248,8 +249,8 @@ TEST(Yield, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
     set.add(arms::on_link(3, slot::a), Basis::direction, 1e-3, 2);
     Model<double> any;
     ASSERT_EQ(any.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-    ASSERT_TRUE(joints_only.only_joints_yield());
-    ASSERT_FALSE(any.only_joints_yield());
+    ASSERT_TRUE(joints_only.has_only_joint_deflections());
+    ASSERT_FALSE(any.has_only_joint_deflections());
     const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
     const arms::NominalJacobian jacobian(arm.robot);
     double worst = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A few hidden cases of every row: bounds that a broken diagnosis cannot meet. The rates themselves are the business of
 // diagnosis_rates, over hundreds of cases.
 #include <gtest/gtest.h>

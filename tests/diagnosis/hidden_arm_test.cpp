@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The judge judged: what it hides is what it says it hides, and its oracle knows it.
 #include "support/hidden_arm.hpp"
 
@@ -8,11 +9,13 @@
 #include <map>
 #include <set>
 
-#include "catalogue/host_model.hpp"
 #include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/prior_knowledge.hpp"
 #include "judge.hpp"
+#include "model/host_model.hpp"
 #include "support/text_file.hpp"
 
 namespace {
@@ -189,8 +192,8 @@ TEST(HiddenArm, CanBeLookedAtWithTheCommandLine) {
     const hidden::Case c = hidden::draw(row, 5);
     const std::string here = folder.path("");
     hidden::dump(c, here);
-    const RobotFile robot = load_robot(here + "/R.yaml");
-    const DataFile data = load_data(here + "/D.csv", robot);
+    const Robot robot = load_robot(here + "/R.yaml");
+    const MeasuredData data = load_data(here + "/D.csv", robot);
     const std::vector<Observation> rows = observe(data, robot);
     ASSERT_EQ(rows.size(), c.train.size());
     for (std::size_t k = 0; k < rows.size(); ++k) {

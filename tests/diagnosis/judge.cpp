@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "judge.hpp"
 
 #include <fmt/format.h>
@@ -104,7 +105,7 @@ std::string group_of(const hidden::Case& c) {
       return hidden::name(c.roughness) +
              (hidden::needs_what_is_missing(c.hidden.front().id.effect, c.roughness) ? ", needed" : "");
     case hidden::Row::outside:
-      if (c.outside->covariate[1] != flexcomp::Covariate::reading)
+      if (c.outside->covariate[1] != flexcomp::Covariate::joint_position)
         return covariate_name(c.outside->covariate[1], 0) + " and an angle";
       return c.outside->formula.substr(0, 4) == "bump" ? "a bump of two joints" : "two joints";
     case hidden::Row::local:

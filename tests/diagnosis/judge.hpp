@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What a diagnosis said of a hidden case, held against the truth and the oracle.
 #ifndef FLEXCOMP_TESTS_DIAGNOSIS_JUDGE_HPP

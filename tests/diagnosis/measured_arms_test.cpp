@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two real arms whose joints turn by curves of their own: found on some poses, shown on others, and four months later.
 #include <gtest/gtest.h>
 
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
+#include "files/data_file.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"

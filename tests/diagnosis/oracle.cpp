@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "oracle.hpp"
 
 #include <Eigen/Dense>
@@ -166,7 +167,7 @@ struct Fitted {
 };
 
 Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
-              const RobotFile& robot) {
+              const Robot& robot) {
   Fitted out;
   out.unknowns = unknowns;
   out.unknowns.prior = prior_knowledge(start.set, unknowns.parameters, true, {});
@@ -193,7 +194,7 @@ Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector
 
 /// Parameters from `first` on that the earlier columns do not carry; the others are set to zero and left out.
 Unknowns independent(Estimate& start, const Unknowns& all, std::size_t first,
-                     const std::vector<Observation>& rows, const RobotFile& robot) {
+                     const std::vector<Observation>& rows, const Robot& robot) {
   const auto model = prepare(start.set, robot, "oracle");
   const MatrixXd columns = linearised(start, *model, rows, all).derivative;
   Span span(columns.rows());
@@ -374,7 +375,7 @@ bool same_name(const EffectId& a, const EffectId& b) {
 std::vector<EffectId> every_name(const Nominal& robot, double pivot_z_m) {
   std::vector<EffectId> names;
   const auto add = [&](EffectId id) {
-    if (!fault(id, robot)) names.push_back(std::move(id));
+    if (!validation_error(id, robot)) names.push_back(std::move(id));
   };
   for (const Effect kind : {Effect::nonlinear_compliance, Effect::backlash, Effect::readout_lag,
                             Effect::encoder_scale, Effect::joint_curve}) {
@@ -421,7 +422,7 @@ std::vector<EffectId> every_name(const Nominal& robot, double pivot_z_m) {
   return names;
 }
 
-double rms_m(const Estimate& estimate, const RobotFile& robot, const std::vector<Observation>& rows) {
+double rms_m(const Estimate& estimate, const Robot& robot, const std::vector<Observation>& rows) {
   const auto model = prepare(estimate.set, robot, "judged rows");
   double sum = 0;
   for (const RowResidual& r : residuals(estimate, *model, rows)) sum += r.position_m.squaredNorm();

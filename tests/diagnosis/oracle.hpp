@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The best that the data of a hidden case allow: the same estimator, told the truth; and by how much the truth beats
 /// every other name.
@@ -45,7 +46,7 @@ std::vector<flexcomp::host::EffectId> every_name(const flexcomp::host::Nominal& 
 bool same_name(const flexcomp::host::EffectId& a, const flexcomp::host::EffectId& b);
 
 /// Root mean square of the 3-D position error.
-double rms_m(const flexcomp::host::Estimate& estimate, const flexcomp::host::RobotFile& robot,
+double rms_m(const flexcomp::host::Estimate& estimate, const flexcomp::host::Robot& robot,
              const std::vector<flexcomp::host::Observation>& rows);
 
 }  // namespace judging

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rates of the diagnosis over hundreds of hidden cases, beside what the data allow.
 #include <fmt/format.h>
 

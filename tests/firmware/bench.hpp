@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the firmware's tests share: an arm, images for it, and a flash memory whose power can be cut at any
 // byte.
 #ifndef FLEXCOMP_TESTS_FIRMWARE_BENCH_HPP

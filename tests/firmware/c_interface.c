@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A controller in C99 that sees nothing but flexcomp.h: builds an arm, takes a set in over Modbus TCP, keeps it in a
  * memory of its own, and starts again from it. Ends with 0 where all went as documented. */
 #include "flexcomp.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The control cycle in a thread of its own, as fast as it can, while sets come and go in the background.
 // Every result must be that of exactly one whole set, in the order in which they were made active. (Run it
 // with -fsanitize=thread too.)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The CAN driver of the ZCU102 as it is on the board, over registers in memory. In the emulator the other setting of its
 // switch runs (tests/hil/emulators); here are the words of the manual (UG1085, "CAN Controller").
 #include <gmock/gmock.h>

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // The files about the buses against the firmware itself: every object and every register is asked of the server, and what
 // it has is what the data sheet and the map say, no more and no less. The data sheet is read by rules of its own here.
-#include "bus/bus_files.hpp"
+#include "exchange/bus_files.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

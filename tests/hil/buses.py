@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """flexcomp against flexcomp-controller over real buses, judged by programs that nobody here wrote.
 
     buses.py prepare WORK      makes robots, calibrations, targets and what compensate answers to them

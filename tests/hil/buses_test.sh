@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Host and controller on all three buses at once: CAN on vcan0, Modbus TCP, Modbus RTU (tests/hil/buses.py).
 set -eu
 here=$(dirname "$0")

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The command line teaches and is careful: every example of every --help runs as it stands there; push --dry-run shows what
 # would change and leaves the controller untouched; completion, colours, hints and bars behave on a terminal and in a pipe.
 set -uo pipefail

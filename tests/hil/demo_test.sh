@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # ./demo with the programs that were just built: the whole way, and what it leaves behind. Nothing is installed or built.
 set -euo pipefail
 source=${FLEXCOMP_SOURCE_DIR:?} bin=${FLEXCOMP_BIN_DIR:?}

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # An effect that the first calibration lacks is found in measured rows of the true arm, named, and pushed into the same
 # running controller; the arm's error at targets that were never fitted then shrinks by what held-out rows promised.
 set -euo pipefail

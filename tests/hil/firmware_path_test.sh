@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # docs/firmware.md word for word: from README to a linked image, in a copy of this repository. Skipped (77) where there is
 # no cross compiler or emulator.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Host and controller on Modbus TCP and RTU, on this machine's own kernel (tests/hil/buses.py).
 set -eu
 here=$(dirname "$0")

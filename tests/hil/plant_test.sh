@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Two implementations of the same words: the plant (KDL, its own files) and the core must put the arm at the same place,
 # with every effect of the catalogue, load, temperature and motion. And the plant shares no code with what it judges.
 set -euo pipefail

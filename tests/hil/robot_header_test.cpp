@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // The nominal robot on its way into a controller: what `flexcomp export` writes reads back to the very doubles of the
 // robot file, so that both sides have the same nominal hash.
-#include "files/robot_header.hpp"
+#include "exchange/robot_header.hpp"
 
 #include <gmock/gmock.h>
 
@@ -15,7 +16,7 @@
 namespace flexcomp::host {
 namespace {
 
-RobotFile robot_file(const std::string& name) {
+Robot robot_file(const std::string& name) {
   return load_robot(std::string(FLEXCOMP_SOURCE_DIR) + "/host/robots/" + name + ".yaml");
 }
 
@@ -40,7 +41,7 @@ bool same_bits(const std::vector<double>& a, const double* b) {
 }
 
 TEST(RobotHeader, InTheRepositoryIsTheRobotFileToTheLastBit) {
-  const RobotFile file = robot_file("tx60l");
+  const Robot file = robot_file("tx60l");
   const std::vector<double> expected = numbers(file.nominal);
   ASSERT_EQ(sizeof staubli_tx60l, offsetof(flexcomp_robot, links) + expected.size() * sizeof(double));
   EXPECT_TRUE(same_bits(expected, &staubli_tx60l.links[0].theta_rad));
@@ -56,7 +57,7 @@ TEST(RobotHeader, InTheRepositoryIsTheRobotFileToTheLastBit) {
 
 TEST(RobotHeader, NumbersReadBackToTheSameBits) {
   for (const char* name : {"tx60l", "rx160l", "ur10", "ur5"}) {
-    RobotFile file = robot_file(name);
+    Robot file = robot_file(name);
     file.nominal.links[1].beta_rad = -0.0;  // signs, subnormals and all digits survive
     file.nominal.links[2].d_m = 1.0 / 3;
     file.nominal.payload_kg = 4.9e-324;
@@ -83,7 +84,7 @@ TEST(RobotHeader, NamesBecomeIdentifiersAndLiterals) {
   EXPECT_EQ(c_identifier("_arm"), "robot__arm");
   EXPECT_EQ(c_identifier("double"), "robot_double");
   EXPECT_EQ(c_identifier("Stäubli"), "St__ubli");
-  RobotFile file = robot_file("ur5");
+  Robot file = robot_file("ur5");
   file.name = "a \"b\" \\ ?\?= ä9";
   EXPECT_THAT(robot_header(file), testing::HasSubstr(R"("a \"b\" \\ \?\?= \303\2449")"));
 }

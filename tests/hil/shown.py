@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a page of the documentation shows is true: its commands are run as they stand there, in order, in one shell, and must
 print what is printed under them."""
 import os, re, signal, subprocess

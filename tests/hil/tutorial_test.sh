@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # docs/tutorial.md word for word: every command of it in order, each must print what stands there, and every figure of the
 # text in mm must be one of those that were printed. What it makes stays in build/…/tutorial; docs/pictures/make draws that.
 set -euo pipefail

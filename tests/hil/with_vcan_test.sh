@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # hil/with-vcan: bytes, exit status, arguments, environment and folder come through; the bus is there; limits and
 # signals end everything and leave nothing behind.
 set -u

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /** A headless Chromium that draws WebGL in software, and pages in it that note whatever goes wrong. */
 import {createRequire} from 'node:module';
 import {join} from 'node:path';

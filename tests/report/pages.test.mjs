@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /**
  * Pages of identify, validate, plan, diagnose and report as a browser shows them: on a phone and on a desk, light, dark and
  * on paper, without scripts, without WebGL.

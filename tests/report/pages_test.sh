@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Pages that the commands make, in a real browser: pages.test.mjs. Installs what drives the browser, as the lock file
 # pins it, in the build folder. Skipped (77) where there is no Chromium; ./check installs it.
 set -uo pipefail

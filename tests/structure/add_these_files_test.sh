@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # add_these_files_test.sh SOURCE EIGEN PREFIX CPU SCALAR LINK [-- EMULATOR...]
 # A build without our CMake, as docs/targets.md tells it: the Makefile that stands there, word for word, then a C program
 # with the flags that it names, linked and run. PREFIX is that of the compilers, empty for this machine; LINK holds the

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # installed_package_test.sh BUILD CONSUMER [CMAKE OPTION...] [-- EMULATOR...]
 # find_package(flexcomp) from an installed copy: a project elsewhere configures, builds and runs, here or, with a
 # toolchain file among the options, in an emulator.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the tests calibrate: three arms, the paper's Table 1, random poses. SI units: m, rad, kg, N, K, s.
 #ifndef FLEXCOMP_TESTS_SUPPORT_ARMS_HPP

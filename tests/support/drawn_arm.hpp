@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Arms as drawings state them: joint origins and axes. Written as URDF for the program, and as a chain of KDL, which
 /// shares no code with it, for the judge.
@@ -19,20 +20,20 @@
 
 namespace drawn {
 
-using Triple = std::array<double, 3>;
+using Vec3 = std::array<double, 3>;
 
 /// A joint of a URDF; fixed where it has no axis.
 struct Joint {
-  Triple xyz_m{};
-  Triple rpy_rad{};
-  Triple axis{};
+  Vec3 xyz_m{};
+  Vec3 rpy_rad{};
+  Vec3 axis{};
 
-  bool is_fixed() const { return axis == Triple{}; }
+  bool is_fixed() const { return axis == Vec3{}; }
 };
 
 using Arm = std::vector<Joint>;  ///< from the base to the tip
 
-inline KDL::Vector vector(const Triple& t) { return {t[0], t[1], t[2]}; }
+inline KDL::Vector vector(const Vec3& t) { return {t[0], t[1], t[2]}; }
 
 inline KDL::Chain chain_of(const Arm& arm) {
   KDL::Chain chain;
@@ -72,7 +73,7 @@ class Judge {
   KDL::ChainFkSolverPos_recursive solver_;
 };
 
-inline std::string text(const Triple& t) {
+inline std::string text(const Vec3& t) {
   std::ostringstream out;
   out << std::setprecision(std::numeric_limits<double>::max_digits10) << t[0] << ' ' << t[1] << ' ' << t[2];
   return out.str();
@@ -97,7 +98,7 @@ inline std::string urdf(const Arm& arm) {
   return out + "</robot>\n";
 }
 
-inline double length(const Triple& t) { return std::hypot(t[0], t[1], t[2]); }
+inline double length(const Vec3& t) { return std::hypot(t[0], t[1], t[2]); }
 
 /// Sum of all offsets: no point of the arm is further from the base.
 inline double size_m(const Arm& arm) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "support/hidden_arm.hpp"
 
 #include <fmt/format.h>
@@ -8,6 +9,8 @@
 #include <stdexcept>
 
 #include "files/calibration_file.hpp"
+#include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "identification/residuals.hpp"
 #include "support/arms.hpp"
@@ -484,7 +487,7 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
   unsigned b = a;
   while (b == a) b = random.joint();
   if (random.below(2) == 0) std::swap(a, b);
-  out.covariate = {Covariate::reading, Covariate::reading};
+  out.covariate = {Covariate::joint_position, Covariate::joint_position};
   out.covariate_joint = {a, b};
   const double phase = random.uniform(0, turn);
   const double full_kg = c.robot.nominal.payload_kg;
@@ -531,7 +534,7 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
     case 5:
     case 6: {
       const unsigned k = which == 5 ? out.joint : random.joint();
-      out.covariate = {Covariate::reading, Covariate::payload};
+      out.covariate = {Covariate::joint_position, Covariate::payload};
       out.covariate_joint = {k, 0};
       if (which == 5) {
         out.formula = fmt::format("payload sin(q{} + {:.2f})", k, phase);
@@ -543,7 +546,7 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
       break;
     }
     default:
-      out.covariate = {Covariate::reading, Covariate::temperature};
+      out.covariate = {Covariate::joint_position, Covariate::temperature};
       out.covariate_joint = {out.joint, 0};
       out.formula = fmt::format("dT sin(q{} + {:.2f})", out.joint, phase);
       out.shape = [phase, reference = c.nominal.reference_temperature_c](double x, double t) {
@@ -923,7 +926,7 @@ void dump(const Case& c, const std::string& folder) {
   namespace host = flexcomp::host;
   const auto save_rows = [&](const std::string& file, const std::vector<Observation>& rows,
                              std::size_t first) {
-    host::DataFile data;
+    host::MeasuredData data;
     data.kind = host::MeasurementKind::pose;
     data.columns = c.columns;
     for (std::size_t k = 0; k < rows.size(); ++k) {

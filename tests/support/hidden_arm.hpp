@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// True arms with hidden effects, measured: what the diagnosis is judged by. The arm moves by plain_arm.hpp, without a
 /// line of the core; the catalogue gives nothing but names. SI units.
@@ -12,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "catalogue/catalogue.hpp"
-#include "files/data_file.hpp"
-#include "files/robot_file.hpp"
+#include "measurement/measured_data.hpp"
 #include "measurement/observation.hpp"
+#include "model/effects.hpp"
+#include "model/robot.hpp"
 #include "support/plain_arm.hpp"
 
 namespace hidden {
@@ -72,7 +73,7 @@ struct Case {
   std::uint64_t seed = 0;
   std::size_t arm = 0;  ///< of arms::all()
   std::string arm_name;
-  flexcomp::host::RobotFile robot;
+  flexcomp::host::Robot robot;
   plain::Nominal nominal;
   plain::Truth truth;          ///< everything: geometry, compliances, gravity, and what is hidden
   std::vector<Effect> hidden;  ///< effects of the catalogue that are hidden

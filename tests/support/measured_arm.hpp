@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Real arms, measured by others (../shared/data, or the folder that FLEXCOMP_DATA names).
 #ifndef FLEXCOMP_TESTS_SUPPORT_MEASURED_ARM_HPP
@@ -12,12 +13,13 @@
 #include <vector>
 
 #include "files/data_file.hpp"
+#include "files/robot_file.hpp"
 #include "measurement/observation.hpp"
 
 namespace flexcomp::host {
 
 struct MeasuredArm {
-  RobotFile robot;
+  Robot robot;
   std::string folder;
 
   std::vector<Observation> rows(const std::string& file) const {

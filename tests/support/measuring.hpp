@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Simulated measurements of an assumed true TX60L, as the tests of the identification want them.
 #ifndef FLEXCOMP_TESTS_SUPPORT_MEASURING_HPP
 #define FLEXCOMP_TESTS_SUPPORT_MEASURING_HPP
@@ -6,10 +7,10 @@
 #include <random>
 #include <vector>
 
-#include "catalogue/host_model.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/residuals.hpp"
 #include "measurement/observation.hpp"
+#include "model/host_model.hpp"
 #include "support/arms.hpp"
 #include "units.hpp"
 
@@ -21,8 +22,8 @@ using namespace flexcomp::host;
 inline constexpr double kPosition = 0.035e-3;
 inline const double kOrientation = radians(0.007);
 
-inline RobotFile tx60l() {
-  RobotFile robot;
+inline Robot tx60l() {
+  Robot robot;
   robot.name = "staubli-tx60l";
   robot.nominal = arms::tx60l();
   robot.position_sigma_m = kPosition;
@@ -67,7 +68,7 @@ inline Observation measure(const HostModel& model, const arms::Joints& q, std::s
   return row;
 }
 
-inline std::vector<Observation> measure(const RobotFile& robot, const TermSet& set, std::size_t count,
+inline std::vector<Observation> measure(const Robot& robot, const TermSet& set, std::size_t count,
                                         std::uint64_t seed, const Measuring& how = {}) {
   const auto model = prepare(set, robot, "truth");
   std::mt19937_64 random(seed);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The flexible arm of model.md and effects.md as 4x4 matrices, one after the other: slow, obvious, and without a
 /// line of the core. SI units: m, rad, kg, N, N·m, K, s. Joints and links are counted from 1, as in the files.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Terms at every place with every basis, at sizes that occur in factories.
 #ifndef FLEXCOMP_TESTS_SUPPORT_RANDOM_TERMS_HPP
@@ -47,7 +48,7 @@ inline double usual_value(const flexcomp::Term<double>& t) {
       return 100;  // N·m
     case Basis::load_torque_cubed:
       return 64000;  // (N·m)^3
-    case Basis::reading:
+    case Basis::joint_position:
       return 3;  // rad
     case Basis::thermal:
       return 5;  // K·m
@@ -88,7 +89,7 @@ inline void add_usual_tables(TermSet<double>& set, Random& random) {
     set.tables.back().column_joint = column_joint;
   };
   using flexcomp::Covariate;
-  grid({-2, -0.5, 0.25, 1.5}, {0, 3, 6}, Covariate::reading, 1, Covariate::payload, 0);
+  grid({-2, -0.5, 0.25, 1.5}, {0, 3, 6}, Covariate::joint_position, 1, Covariate::payload, 0);
   grid({12, 20, 35}, {0, 1800, 3600, 7200}, Covariate::temperature, 0, Covariate::time, 0);
   grid({-1, 0, 1}, {-1, -0.1, 0.1, 1}, Covariate::direction, 2, Covariate::relative_speed, 4);
 }
@@ -121,7 +122,7 @@ inline std::vector<flexcomp::Term<double>> all_bases(flexcomp::Place place, Rand
          static_cast<double>(joint + 1) +
              static_cast<double>(random.below(static_cast<std::size_t>(5 - joint))),
          joint);
-  push(Basis::reading);
+  push(Basis::joint_position);
   push(Basis::sine, 2);
   push(Basis::cosine, 100);
   push(Basis::direction);

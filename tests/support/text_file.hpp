@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files that a test makes, and input that must be refused.
 #ifndef FLEXCOMP_TESTS_SUPPORT_TEXT_FILE_HPP
@@ -13,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "files/input_error.hpp"
+#include "input_error.hpp"
 
 namespace support {
 

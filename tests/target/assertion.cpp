@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An index beyond a vector: Eigen's assertion must end in the firmware's fault hook.
 #include "flexcomp/linear.hpp"
 

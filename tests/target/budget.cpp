@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The instruction budget of the control step: 39 terms, then 200 calls of flexcomp_step with random joint commands at
 // which the smallest singular value of the Jacobian is at least 0.1 (m), each from a cold start (nothing of one command
 // helps the next). Prints what each took; an outside count from the entry of flexcomp_step to its return gives the same.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // An arm with a set in its storage, as the budget programs measure it: the TX60L with the paper's 39 terms and, where
 // asked for, a curve on each of the six joints.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of the instruction budget, one line each: "name count". tests/target/budget.cpp is the step alone.
 #include "budget_arm.hpp"
 #include "flexcomp/compensate.hpp"

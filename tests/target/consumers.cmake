@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A firmware engineer's two ways to the library, with the board of this target: the installed package with its toolchain
 # file, and a build without our CMake (docs/targets.md).
 set(boards "${PROJECT_SOURCE_DIR}/firmware/boards")

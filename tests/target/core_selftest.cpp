@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The core on a target against the host: image, forward model, columns of H and compensation bit by
 // bit, in the target's scalar; in float besides within a tolerance of the double result.
 #include <cstring>

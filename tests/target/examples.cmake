@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The examples of firmware/examples that need no board of their own: they run on the host and, as images, on every
 # target, and end with 0 where they get the host's numbers. C as C90, which is what the oldest controllers have.
 set(examples "${PROJECT_SOURCE_DIR}/firmware/examples")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Stack, flash and RAM of the library against docs/targets.md, and samples of what the stack's measure refuses.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 foreach(name nothing core_store both_buses)

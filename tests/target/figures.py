@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Stack, flash and RAM of the firmware library on one target, against the table in docs/targets.md.
 
   figures.py check  --doc D.md --target cortex-m7 --build DIR --tools arm-none-eabi-

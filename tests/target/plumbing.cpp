@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Proves the way from reset to exit: memory is set up, constructors have run, the floating-point unit works.
 #include <cstdint>
 

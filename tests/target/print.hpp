@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Text and whole numbers to the emulator's standard error.
 #include <cstdint>

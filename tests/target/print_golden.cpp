@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Prints golden.hpp: what the host gets, in double and in float, bit by bit.
 #include <cinttypes>
 #include <cstdio>

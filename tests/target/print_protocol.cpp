@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Prints what the firmware library, built for the scalar of FLEXCOMP_SCALAR, answers on the host:
 //   print_protocol        the transcript that the targets must reach (golden_protocol_*.hpp)
 //   print_protocol set    a set as it lies in a slot, for the examples (firmware/examples/tx60l_set.h)

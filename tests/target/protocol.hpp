@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One exchange with the whole firmware library that host and targets both go through, by flexcomp.h and nothing else:
 // a set comes in over Modbus RTU, is committed, followed for some cycles, read back and probed; a second one comes

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The firmware library on a target against the host: every reply on both buses, every corrected command and every
 // state of one long exchange, byte by byte.
 #include "protocol.hpp"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One calculation that host and targets both make: the paper's TX60L with the errors of its Table 1, as an image,
 // through the model to poses and corrected commands. The host prints the bits (golden.hpp), the targets compare.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # cmake -D NM=nm -D IMAGE=elf-or-archive [-D NO_DOUBLE=ON] -P check_symbols.cmake
 # What may not be in an image of ours: exceptions, unwinding, run-time type information; and where the
 # floating-point unit knows only float, double arithmetic in software.

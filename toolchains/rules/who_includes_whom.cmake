@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # cmake -D ROOT=<source folder> -P who_includes_whom.cmake
 # The rooms of the house and who may know whom:
 #   include    knows nobody

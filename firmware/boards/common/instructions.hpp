@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Counts instructions in an emulator. It executes one instruction per fixed time (-icount), so a clock counts them
 // exactly and repeatably. They are an instruction budget, not cycles: no real processor takes one cycle for each.

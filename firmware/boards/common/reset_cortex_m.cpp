@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cortex-M: vector table and reset entry. The stack pointer comes from the table's first word.
 //
 // An image that has a SysTick or peripherals with interrupts defines flexcomp_board_systick() and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Cortex-R5F: exception table at address 0, stack, floating-point unit. */
     .syntax unified
     .arm

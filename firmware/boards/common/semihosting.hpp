@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Output and end of an image that runs in an emulator, by Arm's semihosting calls. A real controller has
 // neither: this is board code of the emulated machines, never part of the firmware library.

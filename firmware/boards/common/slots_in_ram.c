@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The two slots of flexcomp.h in plain memory, for boards without a driver for their flash: what is pushed is lost
  * with the power. They keep to the rules of flash (a slot is erased as a whole, which takes its time, and each unit is
  * then written once, as flash with a checksum per unit wants it), so that what works here works there. */

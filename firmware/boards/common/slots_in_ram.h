@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #ifndef FLEXCOMP_BOARDS_SLOTS_IN_RAM_H
 #define FLEXCOMP_BOARDS_SLOTS_IN_RAM_H
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every image does between reset and main: memory, constructors, main, and its result as exit status.
 // The reset entry of each board sets the stack and the floating-point unit and then comes here.
 #include <cstdint>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* modbus_rtu_board.h on an Arm MPS2 with the Cortex-M7 image AN500: SysTick, a CMSDK timer as a clock and two CMSDK
  * serial lines. The machine has no non-volatile memory. */
 #include "modbus_rtu_board.h"

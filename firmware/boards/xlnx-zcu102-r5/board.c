@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* canopen_board.h on a Cortex-R5F of the Zynq UltraScale+ (the ZCU102 board). */
 #include "canopen_board.h"
 #include "machine.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The one switch between the real Zynq UltraScale+ and QEMU's model of it (xlnx-zcu102, QEMU 7.2). Hardware is the
  * default; the build of the emulated image sets the other. Everything that differs asks this and nothing else:
  *   - the identifier word of a CAN frame and the order of its bytes in the data words (zynqmp_can_frame.h);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "zynqmp_can.h"
 
 #include "machine.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Driver of a Zynq UltraScale+ CAN controller (CAN 2.0, the one in the processing system), polled. */
 #ifndef FLEXCOMP_ZYNQMP_CAN_H
 #define FLEXCOMP_ZYNQMP_CAN_H

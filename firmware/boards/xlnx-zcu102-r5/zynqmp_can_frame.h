@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* How a CAN frame lies in the FIFO words of the Zynq UltraScale+ CAN controller (UG1085, chapter "CAN Controller"),
  * and how QEMU's model has it instead. No access to hardware in here. */
 #ifndef FLEXCOMP_ZYNQMP_CAN_FRAME_H

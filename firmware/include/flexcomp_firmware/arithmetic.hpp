@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// All of the core that calculates, compiled once: inlined into each of their callers its templates would lie in
 /// flash three times. And compiled for speed: what the control cycle shares with the building of a model (sine and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// CANopen node to CiA 301: NMT slave, boot-up, heartbeat producer and one SDO server (expedited and
 /// segmented) with the object dictionary of canopen_objects.hpp. Frames come and go through callbacks; no I/O

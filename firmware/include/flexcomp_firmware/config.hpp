@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The types that the library is built for; see flexcomp_config.h.
 #ifndef FLEXCOMP_FIRMWARE_CONFIG_HPP

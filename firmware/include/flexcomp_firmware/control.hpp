@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The control cycle's step: joint command and context in, corrected joint command out.
 #ifndef FLEXCOMP_FIRMWARE_CONTROL_HPP
@@ -92,8 +93,8 @@ class ControlCycle {
   Scalar band_inverse_ = Scalar(0);
   Joints direction_{};
   Joints last_command_{};
-  Joints correction_{};  ///< of the last cycle, rad
-  Joints kept_{};        ///< difference that decays, rad
+  Joints correction_{};   ///< of the last cycle, rad
+  Joints fade_offset_{};  ///< difference that decays, rad
   std::uint32_t fade_left_ = 0;
   Source source_ = Source::pass;
   bool tracking_ = false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The controller's side of the wire without a bus: parameter store, control cycle and probe behind the
 /// records of flexcomp/wire/store_state.hpp. The bus servers talk to this.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// How a parameter set changes hands between the background, which takes sets in, and the control
 /// cycle, which uses one: a request word that only the background writes and an acknowledgement that only the

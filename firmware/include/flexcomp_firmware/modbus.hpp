@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Modbus server: the PDU layer as a function from request to response (Modbus Application Protocol
 /// V1.1b3) and the two framings as byte-stream machines (Modbus over Serial Line V1.02, Messaging on TCP/IP

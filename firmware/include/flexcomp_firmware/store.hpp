@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The parameter store: takes in a parameter image, checks it, writes it to non-volatile memory, makes
 /// it active, and brings it back after a power loss. One machine behind every bus.

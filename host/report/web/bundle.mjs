@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // node bundle.mjs PACKAGES OUT.cpp
 //
 // Bundles src/ with three and uplot (from PACKAGES/node_modules) into one script and one style sheet, and writes them as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # cmake -D NPM=... -D FROM=<folder with package.json and its lock file> -D TO=<folder> -P install.cmake
 # Exactly what the lock file names, into TO/node_modules. No package runs a script of its own.
 foreach(file package.json package-lock.json)

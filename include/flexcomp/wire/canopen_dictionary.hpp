@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The object dictionary as a table: every object with its type, access, size and name, the one home of what
 /// canopen_objects.hpp explains. The firmware serves it, the host writes the electronic data sheet (CiA 306) of it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// CANopen object dictionary (CiA 301). The records and commands are described in store_state.hpp, all
 /// little-endian.

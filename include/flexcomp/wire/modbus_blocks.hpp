@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The Modbus register map as a table: every block with its place, access and name, the one home of what modbus_map.hpp
 /// explains. The firmware serves it, the host writes it as a file.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Modbus register map (Modbus Application Protocol V1.1b3). Addresses are those of the PDU, from 0; a tool
 /// that counts from 1 (or from 40001) adds one. The records and commands are described in store_state.hpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Which arm a controller was built for: its nominal robot and name as one record, so that a set can be pushed
 /// and pulled with nothing but the bus at hand. The hashes of the capability record prove it.

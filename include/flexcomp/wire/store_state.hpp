@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What controller and host say to each other about the parameter store, the same on every bus: the numbers
 /// of states, commands and answers, and four records. How a bus carries them is in modbus_map.hpp and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What hil/closed-loop found, judged.
 
     closed_loop.py closed_loop.json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash disable=SC2034
 # What the tests of emulated controllers share; sourced. Leaves with ctest's "skipped" where a host program is missing.
 set -eu

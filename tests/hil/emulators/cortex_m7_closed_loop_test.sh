@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Measured, identified, pushed into the emulated Cortex-M7 over Modbus RTU; its commands move the true arm: those it
 # answers to a probe, and those its control cycle gives to the drives.
 here=${BASH_SOURCE[0]%/*}

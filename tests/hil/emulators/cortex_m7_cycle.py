@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The control cycle is never disturbed: counted instructions of each step, its rhythm, and the commands' smoothness,
 with an idle bus and under full load.
 

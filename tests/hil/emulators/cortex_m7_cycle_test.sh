@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The control cycle of the emulated Cortex-M7, undisturbed by whatever its bus does (cortex_m7_cycle.py).
 . "${BASH_SOURCE[0]%/*}/common.sh"
 shift_count=${1:-4}

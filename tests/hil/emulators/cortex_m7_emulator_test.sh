@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # hil/emulators/cortex-m7-modbus: exit statuses come through, what cannot work is said, nothing is left behind.
 . "${BASH_SOURCE[0]%/*}/common.sh"
 emulator=$hil/emulators/cortex-m7-modbus

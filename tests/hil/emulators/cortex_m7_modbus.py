@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The emulated controller on its serial line, asked by our own client and by programs that nobody here wrote.
 
     cortex_m7_modbus.py WORK      inside hil/emulators/cortex-m7-modbus; WORK as `buses.py prepare` leaves it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stops the emulated controller's arm at some poses of its path; what its control cycle was told and what it gives
 to the drives there, as two files of joint angles.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The firmware in an emulated Cortex-R5F, on its emulated CAN controller, judged on vcan0.
 
     cortex_r5f_canopen.py prepare WORK   files, and what compensate answers to them; needs no bus

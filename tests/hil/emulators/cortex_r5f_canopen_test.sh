@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The emulated Cortex-R5F as a CANopen node on vcan0: our own client, can-utils, python-can and tshark
 # (cortex_r5f_canopen.py).
 here=${BASH_SOURCE[0]%/*}

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the tests of emulated controllers share: the bench that buses.py needs around a controller that runs already;
 of the Cortex-M7 also its console, and a Modbus master of their own."""
 import json

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A controller elsewhere, with nothing but the installed flexcomp.h: without a set it passes commands through, and
  * says so. */
 #include <flexcomp.h>

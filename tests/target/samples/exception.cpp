@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused after the build: an exception, although this file alone was compiled with them.
 struct Failure {
   int code;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused at link time: a solve with a matrix right-hand side calls malloc even at fixed size.
 #include <Eigen/Dense>
 volatile int size = 1;

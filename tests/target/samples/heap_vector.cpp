@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused at link time: a container with a heap behind it.
 #include <vector>
 volatile unsigned count = 3;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused after the build: run-time type information.
 struct Base {
   virtual int kind() const { return 0; }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The same with a CANopen node and a Modbus RTU line. */
 #include "hooks.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Core and parameter store, no bus: a controller that is loaded by other means. Every call of such a
  * controller but the texts for people. */
 #include "hooks.h"

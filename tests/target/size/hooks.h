@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The least that a program has to bring: hooks that do nothing, and a robot that the compiler knows nothing of. */
 #ifndef FLEXCOMP_TEST_SIZE_HOOKS_H
 #define FLEXCOMP_TEST_SIZE_HOOKS_H

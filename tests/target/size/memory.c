@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Compiled, not linked: the memory that the caller gives, as symbols whose sizes can be read. */
 #include <flexcomp.h>
 

@@ -1,2 +1,3 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What an image holds before the library comes in: the board's start. */
 int main(void) { return 0; }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /**
  * The nominal arm as far as it is drawn: frames of the links by Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha)
  * Rot(y,beta). What the calibrated arm does differently is far below a pixel.

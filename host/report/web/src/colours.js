@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 const names = ['paper', 'ink', 'soft', 'grid', 'axis', 'before', 'after', 'floor', 'x', 'y', 'z'];
 const paper = matchMedia('print');
 let printing = false;

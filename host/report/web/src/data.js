@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /**
  * The numbers of a page as web_data.cpp writes them, in the units that are drawn: rad for joints, m for places, mm for
  * errors, degrees for their angles.

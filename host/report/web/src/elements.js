@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /** element('p', {class: 'note'}, 'text', child…); on… attributes are listeners. */
 export function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);

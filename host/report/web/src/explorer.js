@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import uPlot from 'uplot';
 import {colours, onScheme} from './colours.js';
 import {lengthText, roundDown, roundUp, shown, tickText} from './data.js';

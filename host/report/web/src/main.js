@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import './page.css';
 import {ArmView} from './view.js';
 import {readData} from './data.js';

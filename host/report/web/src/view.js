@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import {
   AmbientLight, BoxGeometry, BufferGeometry, CapsuleGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry,
   DirectionalLight, DoubleSide, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh,

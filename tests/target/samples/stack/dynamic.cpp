@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused by figures.py: a frame whose size is known only at run time.
 void use(char*, int);
 void use(char* p, int n) { p[n - 1] = 1; }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refused by figures.py: how deep it goes depends on the data.
 volatile int depth = 3;
 [[gnu::noipa]] int other();

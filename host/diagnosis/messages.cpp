@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diagnosis/messages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "units.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+/// Of more effects than these the verdict gives the number: the table below names them.
+constexpr std::size_t named_in_full = 5;
+constexpr double arcsec_per_rad = 180.0 * 3600.0 / pi;
+
+/// once, twice, 3 times, 2.5 times
+std::string times(double n) {
+  if (n == 1) return "once";
+  if (n == 2) return "twice";
+  return fmt::format("{:g} times", n);
+}
+
+std::string with_sigma(double value, double sigma) { return fmt::format("{:.4g} +- {:.2g}", value, sigma); }
+
+/// The same number as mechanics speak of it; empty where the file's unit is that already.
+std::string for_mechanics(const std::string& key, double value, double sigma) {
+  const std::string_view k = key;
+  const double v = value * arcsec_per_rad, s = sigma * arcsec_per_rad;
+  if (k.ends_with("rad_per_nm")) return with_sigma(v, s) + " arcsec per N m";
+  if (k.ends_with("rad_per_nm3")) return with_sigma(v, s) + " arcsec per (N m)^3";
+  if (k == "gain") return with_sigma(v * pi / 2, s * pi / 2) + " arcsec over 90 deg";
+  if (k == "per_k") return with_sigma(value * 1e6, sigma * 1e6) + " um per metre and K";
+  if (k == "rad" || k.ends_with("_rad")) return with_sigma(v, s) + " arcsec";
+  return "";
+}
+
+std::string list_of(const std::vector<std::string>& items) {
+  std::string text;
+  for (std::size_t k = 0; k < items.size(); ++k) {
+    text += items[k];
+    if (k + 1 < items.size()) text += k + 2 == items.size() ? " and " : ", ";
+  }
+  return text;
+}
+
+/// The size of a harmonic as one number: sine and cosine are of no interest to who looks for a bad gear.
+std::string amplitude(const FoundEffect& effect) {
+  const auto& c = effect.coefficients;
+  const double size = std::hypot(c[0].value, c[1].value);
+  if (!(size > 0)) return "";
+  const double sigma = std::hypot(c[0].value * c[0].sigma, c[1].value * c[1].sigma) / size;
+  const double at = degrees(std::atan2(c[0].value, c[1].value) / effect.id.order);
+  return fmt::format("amplitude {} arcsec, largest at {:.0f} deg{}",
+                     with_sigma(size * arcsec_per_rad, sigma * arcsec_per_rad), at,
+                     effect.id.order > 1 ? fmt::format(" and every {:.4g} deg", 360 / effect.id.order) : "");
+}
+
+std::string curve_size(const KeyedCoefficients& c) {
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  std::vector<double> sigmas;
+  for (const EffectCoefficient& v : c.values) {
+    low = std::min(low, v.value);
+    high = std::max(high, v.value);
+    if (std::isfinite(v.sigma)) sigmas.push_back(v.sigma);  // of a local fault only those near it are fitted
+  }
+  if (sigmas.empty()) sigmas.push_back(std::nan(""));
+  std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2),
+                   sigmas.end());
+  return fmt::format(
+      "{}: {} of them between {:.3g} and {:.3g}, +- {:.2g}  ({:.3g} … {:.3g}, +- {:.2g} arcsec)", c.key,
+      c.values.size(), low, high, sigmas[sigmas.size() / 2], low * arcsec_per_rad, high * arcsec_per_rad,
+      sigmas[sigmas.size() / 2] * arcsec_per_rad);
+}
+
+}  // namespace
+
+std::string in_words(const EffectId& id) {
+  const std::string joint = fmt::format("joint {}", id.joint);
+  switch (id.effect) {
+    case Effect::joint_compliance:
+      return joint + " yields to the load";
+    case Effect::link_gravity:
+      return "upper arm and forearm sag under their own weight";
+    case Effect::nonlinear_compliance:
+      return joint + " yields to the load otherwise than in proportion";
+    case Effect::gear_harmonic:
+      return fmt::format("{} has an error that comes {} per turn of the joint", joint, times(id.order));
+    case Effect::joint_curve:
+      return fmt::format("{} has an error that is a curve over its angle{}", joint,
+                         id.factor == Factor::load_torque   ? ", times the load's torque"
+                         : id.factor == Factor::temperature ? ", times the warming"
+                         : id.factor == Factor::payload     ? ", times the payload"
+                                                            : "");
+    case Effect::backlash:
+      return joint + " stays behind by half a gap, on the side it comes from";
+    case Effect::readout_lag:
+      return joint + " was read before the arm had stopped";
+    case Effect::encoder_scale:
+      return joint + " turns a little more or less than it reads";
+    case Effect::joint_coupling:
+      return fmt::format("{} turns along when joint {} does", joint, id.from);
+    case Effect::axis_wobble:
+      return fmt::format("the axis of {} wobbles {} per turn", joint, times(id.order));
+    case Effect::link_bending:
+      return fmt::format("link {} bends sideways under the load", id.link);
+    case Effect::thermal_growth:
+      return id.link == 0 ? "all links grow with the temperature"
+                          : fmt::format("link {} grows with the temperature", id.link);
+    case Effect::base_drift:
+      return "the base drifts against the instrument while time passes";
+    case Effect::base_compliance:
+      return fmt::format("the base tilts under the load, about a pivot at z = {:.0f} mm", id.pivot_z_m * 1e3);
+    case Effect::payload_error:
+      return "the payload is not what was declared";
+    case Effect::reflector_slip:
+      return fmt::format("the measured point slipped after {:.0f} s", id.after_s);
+    case Effect::unnamed:
+      return fmt::format("{} moves as a function of {} and {} that no effect of the catalogue is",
+                         place_name(id.place), covariate_name(id.covariate[0], id.covariate_joint[0]),
+                         covariate_name(id.covariate[1], id.covariate_joint[1]));
+    case Effect::geometric:
+      break;
+  }
+  return "geometry";
+}
+
+std::string where_sentence(const Misfit& where) {
+  std::vector<std::string> follows;
+  for (std::size_t k = 0; k < where.covariates.size(); ++k) {
+    const bool around = k < where.around_deg.size() && where.around_deg[k];
+    follows.push_back(where.covariates[k] +
+                      (around ? fmt::format(" (around {:.0f} deg)", *where.around_deg[k]) : ""));
+  }
+  return fmt::format("at {}{}: it follows {}; a motion of this place alone explains {:.0f} % of it",
+                     place_name(where.place),
+                     where.joint > 0 ? fmt::format(", joint {} moves wrongly", where.joint) : "",
+                     follows.empty() ? "nothing that was recorded" : list_of(follows), 100 * where.explains);
+}
+
+std::string verdict_sentence(const Diagnosis& d) {
+  if (d.verdict == Verdict::none) {
+    if (!d.doubts.empty()) return "Nothing was found, but these data cannot say that nothing is missing.";
+    return fmt::format(
+        "Nothing is missing: the model explains these data down to their noise{}.",
+        d.outliers.empty()
+            ? ""
+            : fmt::format(", but for {} rows far outside it that do not count in full", d.outliers.size()));
+  }
+  std::vector<std::string> named;
+  for (const FoundEffect& e : d.effects) {
+    if (named.size() == named_in_full) break;
+    named.push_back(in_words(e.id));
+  }
+  if (named.size() < d.effects.size())
+    named.push_back(fmt::format("and {} more", d.effects.size() - named.size()));
+  if (d.verdict == Verdict::named) {
+    return fmt::format(
+        "{} missing and {} a name: {}. Nothing else is left above the noise.",
+        named.size() == 1 ? "One effect was" : fmt::format("{} effects were", d.effects.size()),
+        named.size() == 1 ? "has" : "have", fmt::format("{}", fmt::join(named, "; ")));
+  }
+  std::string text = "Something is wrong that no effect of the catalogue explains";
+  if (d.where) text += ", " + where_sentence(*d.where);
+  text += ".";
+  if (!named.empty()) text += fmt::format(" Besides: {}.", fmt::join(named, "; "));
+  return text;
+}
+
+std::vector<KeyedCoefficients> by_key(const FoundEffect& effect) {
+  std::vector<KeyedCoefficients> list;
+  for (const EffectCoefficient& c : effect.coefficients) {
+    const std::size_t bracket = c.key.find('[');
+    const std::string key = c.key.substr(0, bracket);
+    if (list.empty() || list.back().key != key) list.push_back({key, bracket != std::string::npos, {}});
+    list.back().values.push_back(c);
+  }
+  return list;
+}
+
+std::vector<std::string> sizes(const FoundEffect& effect) {
+  std::vector<std::string> lines;
+  if (effect.id.effect == Effect::gear_harmonic && effect.coefficients.size() == 2) {
+    const std::string text = amplitude(effect);
+    if (!text.empty()) lines.push_back(text);
+  }
+  for (const KeyedCoefficients& c : by_key(effect)) {
+    if (c.list) {
+      lines.push_back(curve_size(c));
+      continue;
+    }
+    const EffectCoefficient& v = c.values.front();
+    const double unit = v.unit.si_per_file_unit();
+    const std::string also = for_mechanics(c.key, v.value, v.sigma);
+    lines.push_back(fmt::format("{} {}{}", c.key, with_sigma(v.value / unit, v.sigma / unit),
+                                also.empty() ? "" : "  (" + also + ")"));
+  }
+  return lines;
+}
+
+std::string rivals_text(const FoundEffect& effect) {
+  std::vector<std::string> names;
+  for (const Rival& r : effect.confounded_with)
+    names.push_back(fmt::format("{} (delta BIC {:.1f})", name(r.id), r.delta_bic));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string not_testable_text(const NotTestable& n) {
+  // move1_deg … move6_deg as one.
+  std::vector<std::string> needs;
+  for (std::size_t k = 0; k < n.needs.size(); ++k) {
+    std::size_t last = k;
+    const auto digit = n.needs[k].find('1');
+    while (digit != std::string::npos && last + 1 < n.needs.size()) {
+      std::string expected = n.needs[k];
+      expected[digit] = static_cast<char>('1' + (last + 1 - k));
+      if (n.needs[last + 1] != expected) break;
+      ++last;
+    }
+    if (last > k + 1) {
+      needs.push_back(n.needs[k] + " … " + n.needs[last]);
+      k = last;
+    } else {
+      needs.push_back(n.needs[k]);
+    }
+  }
+  return fmt::format("{} needs {}", effect_name(n.effect), needs.empty() ? "other poses" : list_of(needs));
+}
+
+std::vector<EffectId> unnamed_effects(const Diagnosis& d, const Robot& robot) {
+  std::vector<EffectId> ids;
+  for (const EffectGroup& group : effects_of(d.after.terms, robot.nominal)) {
+    if (group.id.effect == Effect::unnamed) ids.push_back(group.id);
+  }
+  return ids;
+}
+
+std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calibration,
+                                    const std::string& plan) {
+  std::vector<std::string> steps;
+  std::vector<std::string> measurement;
+  bool confounded = false;
+  for (const FoundEffect& e : d.effects) {
+    if (!e.pushed) measurement.push_back(name(e.id));
+    confounded = confounded || !e.confounded_with.empty();
+  }
+  if (!d.doubts.empty()) {
+    steps.push_back(fmt::format("{} is not to be pushed: see why below", calibration));
+  } else if (std::any_of(d.after.terms.terms.begin(), d.after.terms.terms.end(),
+                         [](const Term<double>& t) { return t.effect == Effect::unnamed; })) {
+    steps.push_back(
+        fmt::format("into the controller: flexcomp push --to BUS {} --allow-unnamed (an effect that nobody "
+                    "understands is pushed only if you say so)",
+                    calibration));
+  } else {
+    steps.push_back(fmt::format("into the controller: flexcomp push --to BUS {}", calibration));
+  }
+  if (!measurement.empty()) {
+    steps.push_back(fmt::format(
+        "{} {} to the measurement, not to the arm: predict and validate use {}, push leaves {} out",
+        list_of(measurement), measurement.size() == 1 ? "belongs" : "belong",
+        measurement.size() == 1 ? "it" : "them", measurement.size() == 1 ? "it" : "them"));
+  }
+  if (confounded && !d.discriminating_poses.empty()) {
+    steps.push_back(plan.empty()
+                        ? "to tell the rivals apart: --plan POSES.csv writes the poses that do; measure them "
+                          "and diagnose all rows together"
+                        : fmt::format("to tell the rivals apart: measure the poses of {} and diagnose all "
+                                      "rows together",
+                                      plan));
+  } else if (confounded) {
+    steps.emplace_back(
+        "no poses were found that tell the rivals apart: their corrections are the same, either will do");
+  }
+  if (!d.not_testable.empty()) {
+    steps.emplace_back(
+        "to have the untested effects tested too: record the columns that they need, and let them vary");
+  }
+  return steps;
+}
+
+double gap_of(double rms_m, double noise_floor_m) {
+  return std::sqrt(std::max(0.0, rms_m * rms_m - noise_floor_m * noise_floor_m));
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "exchange/bus_files.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "files/csv.hpp"
+#include "flexcomp/wire/canopen_dictionary.hpp"
+#include "flexcomp/wire/modbus_blocks.hpp"
+#include "flexcomp/wire/robot_record.hpp"
+
+namespace flexcomp::host {
+
+namespace {
+
+namespace co = wire::canopen;
+namespace map = wire::modbus;
+
+// --- electronic data sheet -----------------------------------------------------------------------------------------------
+
+constexpr unsigned variable_object = 7;
+constexpr unsigned domain_object = 2;
+constexpr unsigned record_object = 9;
+
+const char* access(co::Access a) {
+  switch (a) {
+    case co::Access::constant:
+      return "const";
+    case co::Access::ro:
+      return "ro";
+    case co::Access::wo:
+      return "wo";
+    default:
+      return "rw";
+  }
+}
+
+/// Keys and values of one section; CiA 306 ends lines with CR LF.
+class Sheet {
+ public:
+  void section(const std::string& name) {
+    text_ += fmt::format("{}[{}]\r\n", text_.empty() ? "" : "\r\n", name);
+  }
+  void put(const std::string& key, const std::string& value) {
+    text_ += fmt::format("{}={}\r\n", key, value);
+  }
+  void put(const std::string& key, unsigned value) { put(key, fmt::format("{}", value)); }
+  std::string text() && { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+/// What never changes, or only with the node number.
+std::string default_value(const co::Object& o, std::size_t highest_sub) {
+  if (o.sub == 0 && o.type == co::Type::u8 && o.access == co::Access::constant)
+    return fmt::format("{}", highest_sub);
+  if (o.index == co::device_type) return "0x00000000";
+  if (o.index == co::device_name) return "flexcomp";
+  if (o.index == co::identity && o.sub == 1) return "0x00000000";
+  if (o.index == co::identity && o.sub == 2) return fmt::format("0x{:08X}", co::product_code);
+  if (o.index == co::sdo_server && o.sub == 1) return fmt::format("$NODEID+0x{:X}", co::sdo_request_id);
+  if (o.index == co::sdo_server && o.sub == 2) return fmt::format("$NODEID+0x{:X}", co::sdo_answer_id);
+  return "";
+}
+
+void put_object(Sheet& sheet, const co::Object& o, const std::string& section, const std::string& name,
+                std::size_t highest_sub) {
+  sheet.section(section);
+  sheet.put("ParameterName", name);
+  const bool domain = o.type == co::Type::domain;
+  sheet.put("ObjectType", fmt::format("0x{:X}", domain && o.sub == 0 ? domain_object : variable_object));
+  sheet.put("DataType", fmt::format("0x{:04X}", static_cast<unsigned>(o.type)));
+  sheet.put("AccessType", access(o.access));
+  sheet.put("DefaultValue", default_value(o, highest_sub));
+  sheet.put("PDOMapping", 0);
+}
+
+// --- register map --------------------------------------------------------------------------------------------------------
+
+struct Field {
+  std::string name;
+  std::string type;
+  std::size_t bytes = 0;
+  std::string unit;
+};
+
+/// Walks over a record as encode() and decode() do and notes what comes.
+class Walk {
+ public:
+  template <class T>
+  void operator()(T& value) {
+    static_cast<void>(value);
+    fields.push_back({"", sizeof(T) == 2 ? "u16" : sizeof(T) == 4 ? "u32" : "f64", sizeof(T), ""});
+  }
+  void bytes(const std::uint8_t*, std::size_t size) { fields.push_back({"", "bytes", size, ""}); }
+  void skip(std::size_t size) { fields.push_back({"reserved", "bytes", size, ""}); }
+
+  std::vector<Field> fields;
+};
+
+/// Names in the order of the walk: "name" or "name|unit"; the members of an array one after the other.
+std::vector<Field> named(std::vector<Field> fields, const std::vector<std::string>& names) {
+  std::size_t at = 0;
+  for (Field& f : fields) {
+    if (!f.name.empty()) continue;
+    if (at == names.size()) throw std::logic_error("a record has more fields than names");
+    const auto bar = names[at].find('|');
+    f.name = names[at].substr(0, bar);
+    if (bar != std::string::npos) f.unit = names[at].substr(bar + 1);
+    ++at;
+  }
+  if (at != names.size()) throw std::logic_error("a record has fewer fields than names");
+  return fields;
+}
+
+/// joint 1 … joint 6
+void add_each(std::vector<std::string>& names, const std::string& stem, const std::string& unit) {
+  for (std::size_t j = 1; j <= wire::joints; ++j) names.push_back(fmt::format("{}{}|{}", stem, j, unit));
+}
+void add_xyz(std::vector<std::string>& names, const std::string& stem, const std::string& unit) {
+  for (const char* axis : {"x", "y", "z"}) names.push_back(fmt::format("{}_{}|{}", stem, axis, unit));
+}
+
+std::vector<Field> fields_of(map::Block block) {
+  using map::Block;
+  Walk walk;
+  std::vector<std::string> names;
+  switch (block) {
+    case Block::capability: {
+      wire::Capability record;
+      wire::detail::visit_capability(record, walk);
+      names = {"protocol",
+               "joints",
+               "scalar_bytes",
+               "schema",
+               "bases",
+               "flags",
+               "terms",
+               "tables",
+               "values",
+               "image_bytes",
+               "cycle|us",
+               "fade_cycles",
+               "firmware",
+               "nominal_hash",
+               "name_hash",
+               "plausible_position|m",
+               "plausible_orientation|rad",
+               "largest_correction|rad"};
+      return named(walk.fields, names);
+    }
+    case Block::status: {
+      wire::Status record;
+      wire::detail::visit_status(record, walk);
+      names = {"state",
+               "answer",
+               "refusal",
+               "faults",
+               "detail",
+               "active_slot",
+               "settled",
+               "active_sequence",
+               "active_bytes",
+               "active_crc",
+               "previous_sequence",
+               "announced_bytes",
+               "staged_bytes",
+               "trial_cycles_left",
+               "cycles"};
+      for (std::size_t k = 0; k < 6; ++k)
+        names.push_back(fmt::format("cycles_{}", name(static_cast<StepStatus>(k))));
+      names.emplace_back("last_status");
+      return named(walk.fields, names);
+    }
+    case Block::probe_request: {
+      wire::ProbeRequest record;
+      wire::detail::visit_probe_request(record, walk);
+      add_each(names, "q", "rad");
+      names.emplace_back("payload|kg");
+      add_xyz(names, "payload_com", "m");
+      add_xyz(names, "force", "N");
+      names.insert(names.end(), {"temperature|deg C", "time|s"});
+      add_each(names, "direction", "");
+      add_each(names, "relative_speed", "");
+      return named(walk.fields, names);
+    }
+    case Block::probe_response: {
+      wire::ProbeResponse record;
+      wire::detail::visit_probe_response(record, walk);
+      add_each(names, "q", "rad");
+      names.insert(names.end(),
+                   {"missed_position|m", "missed_orientation|rad", "status", "slot", "sequence"});
+      return named(walk.fields, names);
+    }
+    case Block::robot: {
+      NominalRobot<wire::joints> record;
+      wire::detail::visit_robot(record, walk);
+      for (std::size_t i = 1; i <= wire::joints; ++i) {
+        for (const char* key : {"theta|rad", "d|m", "a|m", "alpha|rad", "beta|rad"})
+          names.push_back(fmt::format("link{}_{}", i, key));
+      }
+      for (std::size_t i = 1; i <= wire::joints; ++i) {
+        names.push_back(fmt::format("joint{}_min|rad", i));
+        names.push_back(fmt::format("joint{}_max|rad", i));
+      }
+      add_xyz(names, "gravity", "m/s^2");
+      add_xyz(names, "tool", "m");
+      for (const char* part : {"w", "x", "y", "z"}) names.push_back(fmt::format("tool_q{}", part));
+      names.emplace_back("payload|kg");
+      add_xyz(names, "payload_com", "m");
+      names.emplace_back("reference_temperature|deg C");
+      std::vector<Field> fields = named(walk.fields, names);
+      fields.push_back({"name_bytes", "u16", 2, ""});
+      fields.push_back({"name", "bytes", wire::robot_name_bytes, ""});
+      return fields;
+    }
+    case Block::people: {
+      std::vector<Field> fields;
+      for (std::size_t j = 1; j <= wire::joints; ++j)
+        fields.push_back({fmt::format("correction{}", j), "f32", 4, "deg"});
+      fields.push_back({"largest_correction", "f32", 4, "deg"});
+      return fields;
+    }
+    default:
+      return {};
+  }
+}
+
+}  // namespace
+
+std::string electronic_data_sheet(const std::string& file) {
+  std::map<std::uint16_t, std::vector<const co::Object*>> by_index;
+  for (const co::Object& o : co::objects) by_index[o.index].push_back(&o);
+  std::array<std::vector<std::uint16_t>, 3> lists;  // mandatory, optional, manufacturer's
+  for (const auto& entry : by_index) {
+    const std::uint16_t index = entry.first;
+    const bool mandatory = index == co::device_type || index == co::error_register || index == co::identity;
+    lists[mandatory ? 0 : index < 0x2000 || index >= 0x6000 ? 1 : 2].push_back(index);
+  }
+
+  Sheet sheet;
+  sheet.section("FileInfo");
+  sheet.put("FileName", file);
+  sheet.put("FileVersion", 1);
+  sheet.put("FileRevision", 0);
+  sheet.put("EDSVersion", "4.0");
+  sheet.put("Description", "flexcomp " FLEXCOMP_VERSION ": compensation of a robot arm");
+  sheet.put("CreatedBy", "flexcomp " FLEXCOMP_VERSION);
+  sheet.section("DeviceInfo");
+  sheet.put("VendorName", "flexcomp");
+  sheet.put("VendorNumber", "0x0");
+  sheet.put("ProductName", "flexcomp");
+  sheet.put("ProductNumber", fmt::format("0x{:08X}", co::product_code));
+  sheet.put("RevisionNumber", 0);
+  sheet.put("OrderCode", "flexcomp");
+  // Bit timing is the board's; CiA 301 names these rates.
+  for (const int rate : {10, 20, 50, 125, 250, 500, 800, 1000})
+    sheet.put(fmt::format("BaudRate_{}", rate), 1);
+  sheet.put("SimpleBootUpMaster", 0);
+  sheet.put("SimpleBootUpSlave", 1);
+  sheet.put("Granularity", 0);
+  sheet.put("DynamicChannelsSupported", 0);
+  sheet.put("GroupMessaging", 0);
+  sheet.put("NrOfRXPDO", 0);
+  sheet.put("NrOfTXPDO", 0);
+  sheet.put("LSS_Supported", 0);
+  sheet.section("DummyUsage");
+  for (unsigned k = 1; k <= 7; ++k) sheet.put(fmt::format("Dummy{:04X}", k), 0);
+  sheet.section("Comments");
+  sheet.put("Lines", 2);
+  sheet.put("Line1", "Records of type DOMAIN are described in include/flexcomp/wire/store_state.hpp.");
+  sheet.put("Line2", "SDO transfers are expedited or segmented; there are no PDOs.");
+  const std::array<const char*, 3> names{"MandatoryObjects", "OptionalObjects", "ManufacturerObjects"};
+  for (std::size_t list = 0; list < lists.size(); ++list) {
+    sheet.section(names[list]);
+    sheet.put("SupportedObjects", static_cast<unsigned>(lists[list].size()));
+    for (std::size_t k = 0; k < lists[list].size(); ++k)
+      sheet.put(fmt::format("{}", k + 1), fmt::format("0x{:04X}", lists[list][k]));
+  }
+  for (const std::vector<std::uint16_t>& list : lists) {
+    for (const std::uint16_t index : list) {
+      const std::vector<const co::Object*>& objects = by_index.at(index);
+      const std::string section = fmt::format("{:04X}", index);
+      if (objects.size() == 1) {
+        put_object(sheet, *objects.front(), section, objects.front()->name, 0);
+        continue;
+      }
+      sheet.section(section);
+      sheet.put("ParameterName", co::record_name(index));
+      sheet.put("ObjectType", fmt::format("0x{:X}", record_object));
+      sheet.put("SubNumber", static_cast<unsigned>(objects.size()));
+      for (const co::Object* o : objects)
+        put_object(sheet, *o, fmt::format("{}sub{:X}", section, o->sub), o->name, objects.back()->sub);
+    }
+  }
+  return std::move(sheet).text();
+}
+
+std::vector<Register> register_map() {
+  std::vector<Register> out;
+  for (const map::BlockDescription& b : map::block_descriptions) {
+    std::vector<Field> fields = fields_of(b.block);
+    if (fields.empty()) {
+      const std::size_t bytes = 2 * std::size_t{b.registers};
+      fields.push_back({"", b.registers == 1 ? "u16" : b.registers == 2 ? "u32" : "bytes", bytes, ""});
+    }
+    std::size_t at = b.address;
+    for (const Field& f : fields) {
+      Register r;
+      r.address = static_cast<std::uint16_t>(at);
+      r.registers = static_cast<std::uint16_t>(f.bytes / 2);
+      r.readable = b.readable;
+      r.writable = b.writable;
+      r.block = b.name;
+      r.name = f.name.empty() ? std::string(b.name) : fmt::format("{}.{}", b.name, f.name);
+      r.type = f.type;
+      r.unit = f.unit;
+      if (&f == &fields.front()) r.text = b.text;
+      at += r.registers;
+      out.push_back(std::move(r));
+    }
+    if (at != std::size_t{b.address} + b.registers)
+      throw std::logic_error("a block and its fields differ in length");
+  }
+  return out;
+}
+
+namespace {
+
+std::string access(const Register& r) { return std::string(r.readable ? "r" : "") + (r.writable ? "w" : ""); }
+
+}  // namespace
+
+std::string register_map_csv() {
+  std::string text = "address,address_hex,registers,access,type,unit,name,description\n";
+  for (const Register& r : register_map()) {
+    text += fmt::format("{},0x{:04X},{},{},{},{},{},{}\n", r.address, r.address, r.registers, access(r),
+                        r.type, csv_cell(r.unit), r.name, csv_cell(r.text));
+  }
+  return text;
+}
+
+std::string register_map_markdown() {
+  std::string text =
+      "# Modbus register map of a flexcomp controller\n\n"
+      "Addresses are those of the protocol, from 0; a tool that counts from 1 (or from 40001) adds one. Read "
+      "by function 03 "
+      "or 04,\nwritten by 06, 16 or 23. u32, f32 and f64 take two, two and four registers, the most "
+      "significant first. "
+      "Reals are IEEE 754.\n\n"
+      "| address | registers | access | type | unit | name | what |\n|---|---|---|---|---|---|---|\n";
+  for (const Register& r : register_map()) {
+    text += fmt::format("| {} (0x{:04X}) | {} | {} | {} | {} | `{}` | {} |\n", r.address, r.address,
+                        r.registers, access(r), r.type, r.unit, r.name, r.text);
+  }
+  return text;
+}
+
+nlohmann::ordered_json register_map_json() {
+  nlohmann::ordered_json out;
+  out["byte_order"] = "big";
+  out["read_functions"] = {3, 4};
+  out["write_functions"] = {6, 16, 23};
+  out["registers"] = nlohmann::ordered_json::array();
+  for (const Register& r : register_map()) {
+    out["registers"].push_back({{"address", r.address},
+                                {"registers", r.registers},
+                                {"access", access(r)},
+                                {"type", r.type},
+                                {"unit", r.unit},
+                                {"block", r.block},
+                                {"name", r.name},
+                                {"description", r.text}});
+  }
+  return out;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Point lists as instruments' programs export them (SpatialAnalyzer, PolyWorks and their like): one point or frame a
+/// line, with its name, in a unit that is declared.
+#ifndef FLEXCOMP_HOST_EXCHANGE_POINT_LIST_HPP
+#define FLEXCOMP_HOST_EXCHANGE_POINT_LIST_HPP
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "exchange/delimited_text.hpp"
+#include "exchange/time_stamp.hpp"
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+/// What three angles rx, ry, rz mean. A file does not tell.
+enum class AngleConvention {
+  fixed_xyz,       ///< Rot(z,rz) Rot(y,ry) Rot(x,rx): about fixed axes x, y, z; SpatialAnalyzer, URDF
+  moving_xyz,      ///< Rot(x,rx) Rot(y,ry) Rot(z,rz): about the axes as they move; Stäubli
+  rotation_vector  ///< one turn about (rx, ry, rz) by its length; Universal Robots
+};
+Eigen::Quaterniond rotation(AngleConvention convention, const Eigen::Vector3d& angles_rad);
+/// KUKA's A, B, C: Rot(z,a) Rot(y,b) Rot(x,c).
+Eigen::Quaterniond kuka_rotation(const Eigen::Vector3d& abc_rad);
+
+struct PointListOptions {
+  DialectChoice dialect;
+  /// Meaning of the columns in order, as name,group,x,y,z,-,sigma; empty: by the header.
+  std::vector<std::string> columns;
+  std::optional<Unit> length;  ///< where the file declares none; never against what it declares
+  std::optional<Unit> angle;
+  std::optional<AngleConvention> angles;
+  double coverage = 1;  ///< the file's uncertainties are so many standard deviations
+};
+
+struct ListedPoint {
+  std::size_t line = 0;
+  std::string name;  ///< with :: between collection, group and point
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  double sigma_m = 0;  ///< per axis (root of the mean square where the file has three)
+  TimeStamp time;
+};
+
+struct PointList {
+  std::string path;
+  Dialect dialect;
+  Unit length;
+  bool names = false;
+  bool orientations = false;
+  bool sigmas = false;
+  bool times = false;
+  std::vector<ListedPoint> points;
+  std::vector<std::string> unused;  ///< columns that were not read: nominal values, deviations …
+};
+
+/// The names that PointListOptions::columns takes.
+const std::vector<std::string>& point_column_names();
+
+/// \throws InputError  as read_delimited(); a unit that is not declared, or otherwise than the option says; columns that
+///                     are missing or there twice; angles without unit or convention; a cell that is no number; a
+///                     quaternion whose norm is off 1 by more than 1e-3; an uncertainty that is not positive
+PointList read_point_list(const std::string& path, const PointListOptions& options);
+
+}  // namespace flexcomp::host
+
+#endif

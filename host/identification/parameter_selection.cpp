@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "identification/parameter_selection.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+namespace flexcomp::host {
+
+namespace {
+
+constexpr std::size_t reference_count = 1000;
+
+Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>& columns) {
+  Eigen::MatrixXd out(m.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    out.col(static_cast<Eigen::Index>(k)) = m.col(static_cast<Eigen::Index>(columns[k]));
+  }
+  return out;
+}
+
+/// Standard deviations in units from an information matrix.
+Eigen::VectorXd sigmas(const Eigen::MatrixXd& information) {
+  return information.ldlt()
+      .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()))
+      .diagonal()
+      .cwiseMax(0)
+      .cwiseSqrt();
+}
+
+Eigen::MatrixXd information(const Eigen::MatrixXd& matrix) { return matrix.transpose() * matrix; }
+
+Eigen::MatrixXd select_both(const Eigen::MatrixXd& m, const std::vector<std::size_t>& kept) {
+  Eigen::MatrixXd out(kept.size(), kept.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          m(static_cast<Eigen::Index>(kept[i]), static_cast<Eigen::Index>(kept[k]));
+    }
+  }
+  return out;
+}
+
+/// The columns of some rows beside those of as many random ones, as far as judging them needs it.
+struct Judge {
+  Eigen::MatrixXd data;    ///< triangular factor of the rows, or the rows themselves
+  Eigen::MatrixXd usual;   ///< information of random rows, per as many as there are
+  std::size_t frames = 0;  ///< the first so many columns are frames: never dropped
+
+  /// Known in principle is not known: a parameter whose standard deviation is over 30 units (3 mm, 1.5 degrees) and
+  /// over 30 times what as many random poses would give is left out, the last in the order first, until none is.
+  /// Otherwise near-confounded ones run off together (a5 = 43 mm +- 40 mm) and the others with them.
+  std::vector<std::size_t> drop_weakly_identifiable(const std::vector<std::size_t>& order,
+                                                    std::vector<std::size_t>& kept) const {
+    constexpr double too_many = 30;
+    const Eigen::MatrixXd here_all = information(data);
+    std::vector<std::size_t> dropped;
+    while (!kept.empty()) {
+      const Eigen::VectorXd here = sigmas(select_both(here_all, kept));
+      const Eigen::VectorXd there = sigmas(select_both(usual, kept));
+      std::size_t worst = kept.size();
+      std::size_t latest = 0;
+      for (std::size_t k = 0; k < kept.size(); ++k) {
+        const Eigen::Index i = static_cast<Eigen::Index>(k);
+        if (kept[k] < frames || !(here[i] > too_many && here[i] > too_many * there[i])) continue;
+        const std::size_t position =
+            static_cast<std::size_t>(std::find(order.begin(), order.end(), kept[k]) - order.begin());
+        if (worst == kept.size() || position > latest) {
+          worst = k;
+          latest = position;
+        }
+      }
+      if (worst == kept.size()) break;
+      dropped.push_back(kept[worst]);
+      kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(worst));
+    }
+    return dropped;
+  }
+
+  bool knows_all() const {
+    std::vector<std::size_t> order(static_cast<std::size_t>(data.cols()));
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::vector<std::size_t> kept = eliminate(data, order).kept;
+    return kept.size() == order.size() && drop_weakly_identifiable(order, kept).empty();
+  }
+};
+
+/// Greedy choice among the random poses of the reference until all columns are known: each adds the most information
+/// about what is still unknown (D-optimal, by rank-six updates).
+std::vector<SuggestedPose> poses_that_cure(Judge judge, const Eigen::MatrixXd& reference,
+                                           const std::vector<Observation>& reference_rows) {
+  constexpr std::size_t most = 40;
+  constexpr Eigen::Index candidates = 300;
+  const Eigen::Index columns = judge.data.cols();
+  // A weak prior of 100 units stands in for what the data do not know.
+  Eigen::MatrixXd covariance =
+      (information(judge.data) + 1e-4 * Eigen::MatrixXd::Identity(columns, columns)).inverse();
+  std::vector<SuggestedPose> chosen;
+  std::set<Eigen::Index> taken;
+  while (chosen.size() < most && !judge.knows_all()) {
+    double best = -1;
+    Eigen::Index which = 0;
+    for (Eigen::Index c = 0; c < candidates; ++c) {
+      if (taken.count(c) != 0) continue;
+      const auto h = reference.middleRows<6>(6 * c);
+      const Eigen::Matrix<double, 6, 6> gain =
+          Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
+      const double gained = gain.llt().matrixLLT().diagonal().array().log().sum();
+      if (gained > best) {
+        best = gained;
+        which = c;
+      }
+    }
+    taken.insert(which);
+    const Eigen::MatrixXd h = reference.middleRows<6>(6 * which);
+    const Eigen::MatrixXd ch = covariance * h.transpose();
+    const Eigen::MatrixXd gain = Eigen::MatrixXd::Identity(6, 6) + h * ch;
+    covariance -= ch * gain.ldlt().solve(ch.transpose());
+    judge.data.conservativeResize(judge.data.rows() + 6, Eigen::NoChange);
+    judge.data.bottomRows<6>() = h;
+    const Observation& row = reference_rows[static_cast<std::size_t>(which)];
+    chosen.push_back({row.q_rad, row.context.payload_kg});
+  }
+  return chosen;
+}
+
+bool has_stiffness(const Unknowns& unknowns, const TermSet& set) {
+  return std::any_of(unknowns.parameters.begin(), unknowns.parameters.end(), [&](const Parameter& p) {
+    return set.terms[p.terms.front()].effect == Effect::joint_compliance;
+  });
+}
+
+bool one_payload(const std::vector<Observation>& rows) {
+  return std::all_of(rows.begin(), rows.end(), [&](const Observation& row) {
+    return std::abs(row.context.payload_kg - rows.front().context.payload_kg) < 1e-6;
+  });
+}
+
+bool without_any_load(const std::vector<Observation>& rows) {
+  return std::all_of(rows.begin(), rows.end(), [](const Observation& row) {
+    const auto& f = row.context.force_n;
+    return row.context.payload_kg == 0 && f[0] == 0 && f[1] == 0 && f[2] == 0;
+  });
+}
+
+std::vector<Observation> reference_like(const Robot& robot, const std::vector<Observation>& rows,
+                                        std::uint64_t seed) {
+  std::vector<Observation> reference = random_observations(robot, rows, reference_count, seed);
+  if (robot.nominal.payload_kg > 0 && without_any_load(rows)) {
+    for (std::size_t k = 1; k < reference.size(); k += 2)
+      reference[k].context.payload_kg = robot.nominal.payload_kg;
+  }
+  return reference;
+}
+
+/// What every second row without its payload would gain. Expected from random poses, carried over to these rows.
+std::vector<PayloadGain> gains_of_a_second_payload(std::vector<Observation> reference, const Estimate& start,
+                                                   const HostModel& model, const Unknowns& fitted,
+                                                   const Eigen::VectorXd& sigma) {
+  constexpr double worth_saying = 1.5;
+  std::vector<PayloadGain> gains;
+  const Eigen::VectorXd one = sigmas(information(linearised(start, model, reference, fitted).derivative));
+  for (std::size_t k = 0; k < reference.size(); k += 2) reference[k].context.payload_kg = 0;
+  const Eigen::VectorXd both = sigmas(information(linearised(start, model, reference, fitted).derivative));
+  const Eigen::VectorXd units = units_of(fitted, start.set);
+  for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
+    const Eigen::Index i = static_cast<Eigen::Index>(fitted.frames.size() + p);
+    if (!(one[i] > worth_saying * both[i])) continue;
+    gains.push_back({fitted.parameters[p].name, sigma[i] * units[i], sigma[i] * units[i] * both[i] / one[i]});
+  }
+  return gains;
+}
+
+}  // namespace
+
+Elimination possible_columns(const Robot& robot, const std::vector<Observation>& like, const Estimate& start,
+                             const Unknowns& all, std::uint64_t seed) {
+  const auto model = prepare(start.set, robot, "identification");
+  const Eigen::MatrixXd reference =
+      linearised(start, *model, reference_like(robot, like, seed), all).derivative;
+  return eliminate(reference, elimination_order(all, start.set), structural_tolerance);
+}
+
+Identifiability analyse_identifiability(const Robot& robot, const std::vector<Observation>& rows,
+                                        const Estimate& start, const Unknowns& all, std::uint64_t seed) {
+  Identifiability out;
+  const std::vector<std::string> names = names_of(all);
+  const std::vector<std::size_t> order = elimination_order(all, start.set);
+  const std::vector<Observation> reference = reference_like(robot, rows, seed);
+  const auto model = prepare(start.set, robot, "identification");
+  const Eigen::MatrixXd reference_matrix = linearised(start, *model, reference, all).derivative;
+  const Eigen::MatrixXd data_matrix = triangular_factor(linearised(start, *model, rows, all).derivative);
+  const Elimination possible = eliminate(reference_matrix, order, structural_tolerance);
+  for (const LostColumn& lost : possible.lost) {
+    Confounded entry{names[lost.column], {}};
+    for (const std::size_t c : lost.with) entry.with.push_back(names[c]);
+    out.confounded.push_back(entry);
+  }
+  std::vector<std::size_t> possible_order;
+  for (const std::size_t c : order) {
+    if (std::binary_search(possible.kept.begin(), possible.kept.end(), c)) possible_order.push_back(c);
+  }
+  Judge judge;
+  judge.data = data_matrix;
+  judge.usual = information(reference_matrix) * (static_cast<double>(rows.size()) / reference_count);
+  judge.frames = all.frames.size();
+  Elimination known = eliminate(data_matrix, possible_order);
+  std::set<std::size_t> missing;
+  for (const LostColumn& lost : known.lost) missing.insert(lost.column);
+  for (const std::size_t c : judge.drop_weakly_identifiable(possible_order, known.kept)) missing.insert(c);
+  for (const std::size_t c : missing) out.missing.push_back(names[c]);
+
+  std::vector<std::size_t> fitted_columns;
+  for (const std::size_t c : possible.kept) {
+    const bool is_frame = c < judge.frames;
+    const PriorKnowledge prior = is_frame ? PriorKnowledge() : all.prior_of(c - judge.frames);
+    if (missing.count(c) != 0 && !std::isfinite(prior.tolerance)) continue;
+    fitted_columns.push_back(c);
+    if (is_frame) {
+      out.fitted.frames.push_back(all.frames[c]);
+    } else {
+      out.fitted.parameters.push_back(all.parameters[c - judge.frames]);
+      out.fitted.prior.push_back(prior);
+    }
+  }
+  if (!missing.empty()) {
+    // In the order of preference, so that the same columns are judged here as above; frames stand first in it.
+    Judge selected;
+    selected.data = select(data_matrix, possible_order);
+    selected.usual = select_both(judge.usual, possible_order);
+    selected.frames = static_cast<std::size_t>(std::count_if(
+        possible_order.begin(), possible_order.end(), [&](std::size_t c) { return c < judge.frames; }));
+    out.cure = poses_that_cure(selected, select(reference_matrix, possible_order), reference);
+  } else if (one_payload(rows) && rows.front().context.payload_kg > 0 && has_stiffness(all, start.set)) {
+    out.payload_gains = gains_of_a_second_payload(reference, start, *model, out.fitted,
+                                                  sigmas(information(select(data_matrix, fitted_columns))));
+  }
+  return out;
+}
+
+}  // namespace flexcomp::host

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Input that is refused: which file, which line, which field, what was expected there and what was found.
+#ifndef FLEXCOMP_HOST_INPUT_ERROR_HPP
+#define FLEXCOMP_HOST_INPUT_ERROR_HPP
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+
+namespace flexcomp::host {
+
+/// Message: `robots/x.yaml:12: joints[3].a_mm: expected a finite number, found 'abc'`. Parts that do not apply are
+/// left empty (line 0) and do not appear.
+class InputError : public std::runtime_error {
+ public:
+  InputError(std::string file, std::size_t line, std::string field, std::string expected, std::string found);
+
+  const std::string& file() const { return file_; }
+  std::size_t line() const { return line_; }  ///< from 1; 0 where the whole file is meant
+  const std::string& field() const { return field_; }
+  const std::string& expected() const { return expected_; }
+  const std::string& found() const { return found_; }
+
+ private:
+  std::string file_;
+  std::size_t line_;
+  std::string field_;
+  std::string expected_;
+  std::string found_;
+};
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Calibration: the identified terms with their covariance, the frames, and the robot they belong to.
+#ifndef FLEXCOMP_HOST_MODEL_CALIBRATION_HPP
+#define FLEXCOMP_HOST_MODEL_CALIBRATION_HPP
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "flexcomp/linear.hpp"
+#include "flexcomp/robot.hpp"
+#include "model/frames.hpp"
+#include "model/robot.hpp"
+#include "model/term_set.hpp"
+
+namespace flexcomp::host {
+
+struct Confounded {
+  std::string parameter;          ///< was left out
+  std::vector<std::string> with;  ///< and is carried by these
+};
+
+/// A parameter whose estimate is the least that physics allows (a compliance of zero).
+struct AtBound {
+  std::string parameter;
+  double upper_95 = 0;  ///< SI: end of the one-sided 95 % interval
+};
+
+/// Joint uncertainty of all that was fitted (frames first): covariance = factor * factor^T, SI. The standard deviations
+/// alone would not do: what two near-confounded parameters lack in common cancels in the pose that they predict.
+struct CovarianceFactor {
+  std::vector<std::string> parameters;  ///< frame_f.x_mm … frame_e.rz_deg, then parameters by name
+  Eigen::MatrixXd factor;               ///< lower triangular, one row per parameter
+};
+
+struct Calibration {
+  std::string path;   ///< as given, for messages
+  std::string robot;  ///< name; empty in a truth file that leaves it out
+  std::optional<Sha256Digest> nominal_hash;
+  TermSet terms;
+  std::vector<double>
+      sigma;  ///< standard deviation per term in SI, NaN where none; may be shorter than terms
+  std::vector<double> value_sigma;          ///< the same per value of the tables
+  std::optional<MeasurementFrames> frames;  ///< where fitted; the base is then not pushed
+  std::optional<CovarianceFactor> covariance;
+  std::vector<Confounded> confounded;
+  std::vector<AtBound> at_bound;
+  std::vector<std::pair<std::string, double>> residuals;  ///< by name with unit, e.g. after_mean_mm
+  std::string tool_version;
+  std::string date;  ///< ISO 8601
+  std::optional<std::uint32_t> sequence;
+
+  Pose<double> f() const { return frames ? frames->f.pose() : Pose<double>(); }
+  Pose<double> e() const { return frames ? frames->e.pose() : Pose<double>(); }
+};
+
+/// Sets robot, hash, tool version and date as of now, in a calibration that is about to be saved.
+void stamp(Calibration& calibration, const Robot& robot);
+
+/// 64 hexadecimal digits and back.
+std::string hex(const Sha256Digest& digest);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A calibration as the bytes that a controller takes, and back.
+#ifndef FLEXCOMP_HOST_MODEL_PARAMETER_IMAGE_HPP
+#define FLEXCOMP_HOST_MODEL_PARAMETER_IMAGE_HPP
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "flexcomp/status.hpp"
+#include "model/calibration.hpp"
+#include "model/robot.hpp"
+
+namespace flexcomp::host {
+
+struct ImageOptions {
+  bool allow_unnamed = false;  ///< push what was found but not understood
+};
+
+/// The parameter image of a calibration, bound to the robot. Left out: what belongs to the measurement (base_drift,
+/// readout_lag, reflector_slip), and the base where frames were fitted. Instances and tables are numbered in order of
+/// appearance, so that image -> calibration file -> image is the identity on bytes.
+/// \throws InputError  unnamed effects (unless allowed), base or tool terms above 20 mm or 2 degrees, terms that the
+///                     core refuses
+std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot& robot,
+                                     std::uint32_t sequence, const ImageOptions& options = {});
+
+/// Effects of a calibration that no image has, because they belong to the measurement and not to the arm: their names.
+std::vector<std::string> never_pushed(const Calibration& calibration, const Robot& robot);
+
+/// Reads an image back into named terms. `source` stands for the file in messages (a file or a bus).
+/// \throws InputError  truncated, altered, for another robot, or with terms that the catalogue cannot name
+Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const Robot& robot,
+                                   const std::string& source);
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,507 @@
+// SPDX-License-Identifier: Apache-2.0
+// The SDO client and the controller on top of it against a server on a socket pair, which can be told to misbehave.
+#include <gmock/gmock.h>
+#include <linux/can.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "bus/canopen_client.hpp"
+#include "bus/sdo_client.hpp"
+#include "bus/transfer.hpp"
+#include "flexcomp/wire/canopen_objects.hpp"
+#include "host/bus/bus_fake_controller.hpp"
+
+namespace flexcomp::host {
+namespace {
+
+namespace co = wire::canopen;
+using fake::numbered_bytes;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using testing::HasSubstr;
+
+constexpr std::uint8_t node = 5;
+
+can_frame frame_of(std::uint32_t id, std::initializer_list<unsigned> bytes) {
+  can_frame out{};
+  out.can_id = id;
+  out.can_dlc = 8;
+  std::size_t k = 0;
+  for (const unsigned b : bytes) out.data[k++] = static_cast<std::uint8_t>(b);
+  return out;
+}
+
+/// Both ends of a bus, the far one served frame by frame in a thread.
+class Bus {
+ public:
+  using Serve = std::function<void(const can_frame&, const std::function<void(const can_frame&)>&)>;
+
+  explicit Bus(Serve serve) : serve_(std::move(serve)) {
+    EXPECT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_), 0);
+    thread_ = std::thread([this] { loop(); });
+  }
+  ~Bus() {
+    stop_ = true;
+    thread_.join();
+    ::close(ends_[1]);
+    if (!given_) ::close(ends_[0]);
+  }
+  int near() const { return ends_[0]; }
+  /// The near end for somebody who closes it.
+  int give() {
+    given_ = true;
+    return ends_[0];
+  }
+  void put(const can_frame& frame) {
+    EXPECT_EQ(::send(ends_[1], &frame, sizeof frame, MSG_NOSIGNAL), static_cast<ssize_t>(sizeof frame));
+  }
+  std::vector<can_frame> seen() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return seen_;
+  }
+
+ private:
+  void loop() {
+    while (!stop_) {
+      pollfd ready{ends_[1], POLLIN, 0};
+      if (::poll(&ready, 1, 5) <= 0) continue;
+      can_frame frame{};
+      if (::recv(ends_[1], &frame, sizeof frame, 0) != sizeof frame) return;
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        seen_.push_back(frame);
+      }
+      serve_(frame, [this](const can_frame& f) { put(f); });
+    }
+  }
+
+  Serve serve_;
+  int ends_[2] = {-1, -1};
+  std::atomic<bool> stop_{false};
+  bool given_ = false;
+  std::mutex mutex_;
+  std::vector<can_frame> seen_;
+  std::thread thread_;
+};
+
+/// An SDO server over a table of objects. Written from the standard for this test, apart from the client.
+class SdoServer {
+ public:
+  std::function<std::uint32_t(ObjectAddress, Bytes& value)> read;         ///< abort code, or 0 and the value
+  std::function<std::uint32_t(ObjectAddress, const Bytes& value)> wrote;  ///< abort code, or 0
+  bool sizes = true;                                                      ///< says sizes in advance
+  int drop_answer = -1;   ///< the answer with this number is lost
+  int wrong_toggle = -1;  ///< the answer with this number has a wrong toggle bit
+  std::function<void(std::uint32_t)> on_abort;
+
+  void operator()(const can_frame& in, const std::function<void(const can_frame&)>& put) {
+    if (in.can_id != 0x600U + node || in.can_dlc != 8) return;
+    can_frame out{};
+    out.can_id = 0x580U + node;
+    out.can_dlc = 8;
+    if (!answer(in, out)) return;
+    const int number = count_++;
+    if (number == drop_answer) return;
+    if (number == wrong_toggle) out.data[0] = static_cast<std::uint8_t>(out.data[0] ^ 0x10U);
+    put(out);
+  }
+
+ private:
+  static ObjectAddress object_of(const can_frame& f) {
+    return {static_cast<std::uint16_t>(f.data[1] | (f.data[2] << 8)), f.data[3]};
+  }
+  bool abort(can_frame& out, std::uint32_t code) {
+    out.data[0] = 0x80;
+    out.data[1] = static_cast<std::uint8_t>(object_.index);
+    out.data[2] = static_cast<std::uint8_t>(object_.index >> 8U);
+    out.data[3] = object_.sub;
+    std::memcpy(out.data + 4, &code, 4);
+    return true;
+  }
+  bool answer(const can_frame& in, can_frame& out) {
+    const unsigned command = in.data[0] >> 5U;
+    if (command == 4) {
+      std::uint32_t code = 0;
+      std::memcpy(&code, in.data + 4, 4);
+      if (on_abort) on_abort(code);
+      return false;
+    }
+    if (command == 1 || command == 2) {
+      object_ = object_of(in);
+      std::memcpy(out.data + 1, in.data + 1, 3);
+      toggle_ = 0;
+    }
+    std::uint32_t code = 0;
+    if (command == 1) {
+      value_.clear();
+      out.data[0] = 0x60;
+      if ((in.data[0] & 2) != 0) {
+        value_.assign(in.data + 4, in.data + 8 - ((in.data[0] >> 2) & 3));
+        code = wrote(object_, value_);
+      }
+    } else if (command == 0) {
+      if ((in.data[0] & 0x10) != toggle_) return abort(out, 0x05030000);
+      value_.insert(value_.end(), in.data + 1, in.data + 8 - ((in.data[0] >> 1) & 7));
+      out.data[0] = static_cast<std::uint8_t>(0x20U | toggle_);
+      toggle_ ^= 0x10U;
+      if ((in.data[0] & 1) != 0) code = wrote(object_, value_);
+    } else if (command == 2) {
+      value_.clear();
+      at_ = 0;
+      code = read(object_, value_);
+      if (value_.size() <= 4 && !value_.empty()) {
+        out.data[0] = static_cast<std::uint8_t>(sizes ? 0x43U | ((4U - value_.size()) << 2U) : 0x42U);
+        std::copy(value_.begin(), value_.end(), out.data + 4);
+      } else {
+        out.data[0] = sizes ? 0x41 : 0x40;
+        const auto size = static_cast<std::uint32_t>(value_.size());
+        if (sizes) std::memcpy(out.data + 4, &size, 4);
+      }
+    } else if (command == 3) {
+      if ((in.data[0] & 0x10) != toggle_) return abort(out, 0x05030000);
+      const std::size_t n = std::min<std::size_t>(7, value_.size() - at_);
+      std::copy_n(value_.begin() + static_cast<std::ptrdiff_t>(at_), n, out.data + 1);
+      at_ += n;
+      const unsigned last = at_ == value_.size() ? 1 : 0;
+      out.data[0] = static_cast<std::uint8_t>(toggle_ | ((7U - n) << 1U) | last);
+      toggle_ ^= 0x10U;
+    } else {
+      return abort(out, 0x05040001);
+    }
+    return code == 0 || abort(out, code);
+  }
+
+  ObjectAddress object_;
+  Bytes value_;
+  std::size_t at_ = 0;
+  unsigned toggle_ = 0;
+  int count_ = 0;
+};
+
+/// A server with one object of any length.
+struct OneObject {
+  Bytes value;
+  SdoServer server;
+  OneObject() {
+    server.read = [this](ObjectAddress, Bytes& out) { return out = value, 0U; };
+    server.wrote = [this](ObjectAddress, const Bytes& in) { return value = in, 0U; };
+  }
+};
+
+TEST(SdoClient, CarriesAnyLengthBothWays) {
+  for (const bool sizes : {true, false}) {
+    OneObject far;
+    far.server.sizes = sizes;
+    Bus bus(std::ref(far.server));
+    SdoClient client(bus.near(), node, milliseconds(1000));
+    for (const std::size_t size : {0, 1, 2, 3, 4, 5, 6, 7, 8, 13, 14, 15, 21, 500, 1000}) {
+      const Bytes sent = numbered_bytes(size);
+      client.download({0x2010, 1}, sent);
+      EXPECT_EQ(far.value, sent) << size;
+      // Without its size, what is given in one frame is always four bytes.
+      if (sizes || size == 0 || size >= 4) {
+        EXPECT_EQ(client.upload({0x2010, 2}), sent) << size;
+      }
+    }
+  }
+}
+
+TEST(SdoClient, SpeaksFramesAsTheStandardHasThem) {
+  OneObject far;
+  Bus bus(std::ref(far.server));
+  SdoClient client(bus.near(), node, milliseconds(1000));
+  const Bytes eight = numbered_bytes(8);
+  client.download({0x2011, 2}, std::span(eight).first(2));
+  client.download({0x2010, 1}, eight);
+  const std::vector<can_frame> seen = bus.seen();
+  ASSERT_EQ(seen.size(), 4U);
+  const auto is = [](const can_frame& f, std::initializer_list<unsigned> bytes) {
+    const can_frame expected = frame_of(0x605, bytes);
+    return f.can_id == expected.can_id && f.can_dlc == 8 && std::memcmp(f.data, expected.data, 8) == 0;
+  };
+  EXPECT_TRUE(is(seen[0], {0x2B, 0x11, 0x20, 2, eight[0], eight[1]}));
+  EXPECT_TRUE(is(seen[1], {0x21, 0x10, 0x20, 1, 8, 0, 0, 0}));
+  EXPECT_TRUE(is(seen[2], {0x00, eight[0], eight[1], eight[2], eight[3], eight[4], eight[5], eight[6]}));
+  EXPECT_TRUE(is(seen[3], {0x1D, eight[7]}));
+}
+
+TEST(SdoClient, SaysAnAbortInWords) {
+  SdoServer server;
+  server.read = [](ObjectAddress, Bytes&) { return 0x06020000U; };
+  Bus bus(std::ref(server));
+  SdoClient client(bus.near(), node, milliseconds(1000));
+  try {
+    client.upload({0x2003, 0});
+    FAIL();
+  } catch (const SdoAbort& e) {
+    EXPECT_TRUE(e.by_server());
+    EXPECT_STREQ(e.what(), "SDO abort 0602 0000, object does not exist at 0x2003:0");
+  }
+}
+
+TEST(SdoClient, GivesUpInTimeAndTellsTheServer) {
+  Bus bus([](const can_frame&, const auto&) {});
+  SdoClient client(bus.near(), node, milliseconds(100));
+  const auto start = steady_clock::now();
+  EXPECT_THROW(client.upload({0x1018, 1}), SdoTimeout);
+  const auto took = steady_clock::now() - start;
+  EXPECT_GE(took, milliseconds(100));
+  EXPECT_LT(took, milliseconds(1000));
+  for (int k = 0; k < 100 && bus.seen().size() < 2; ++k) std::this_thread::sleep_for(milliseconds(5));
+  ASSERT_EQ(bus.seen().size(), 2U);
+  const can_frame expected = frame_of(0x605, {0x80, 0x18, 0x10, 1, 0, 0, 4, 5});
+  EXPECT_EQ(std::memcmp(bus.seen()[1].data, expected.data, 8), 0);
+}
+
+TEST(SdoClient, TakesNoOtherFrameForItsAnswer) {
+  OneObject far;
+  far.value = {1, 2, 3, 4};
+  Bus bus([&far](const can_frame& in, const auto& put) {
+    put(frame_of(0x586, {0x43, 0x18, 0x10, 1, 9, 9, 9, 9}));                  // another node
+    put(frame_of(0x585, {0x43, 0x18, 0x10, 2, 9, 9, 9, 9}));                  // another object
+    put(frame_of(0x585, {0x80, 0x00, 0x20, 0, 0, 0, 4, 5}));                  // an abort about another object
+    put(frame_of(0x585U | CAN_EFF_FLAG, {0x43, 0x18, 0x10, 1, 9, 9, 9, 9}));  // an extended frame
+    can_frame short_one = frame_of(0x585, {0x43, 0x18, 0x10, 1, 9, 9, 9});
+    short_one.can_dlc = 7;
+    put(short_one);
+    far.server(in, put);
+  });
+  // An answer that was still under way when its question was given up.
+  bus.put(frame_of(0x585, {0x43, 0x18, 0x10, 1, 7, 7, 7, 7}));
+  SdoClient client(bus.near(), node, milliseconds(1000));
+  EXPECT_EQ(client.upload({0x1018, 1}), far.value);
+}
+
+TEST(SdoClient, StopsAServerThatMakesNoSense) {
+  const auto code_of = [](const std::function<void(OneObject&)>& spoil, bool upload) -> std::uint32_t {
+    OneObject far;
+    far.value = numbered_bytes(30);
+    spoil(far);
+    std::atomic<std::uint32_t> told{0};
+    far.server.on_abort = [&told](std::uint32_t code) { told = code; };
+    Bus bus(std::ref(far.server));
+    SdoClient client(bus.near(), node, milliseconds(300));
+    try {
+      if (upload) {
+        client.upload({0x2010, 2});
+      } else {
+        client.download({0x2010, 1}, numbered_bytes(30));
+      }
+    } catch (const SdoAbort& e) {
+      for (int k = 0; k < 100 && told == 0; ++k) std::this_thread::sleep_for(milliseconds(2));
+      EXPECT_FALSE(e.by_server());
+      EXPECT_EQ(told, e.code());
+      return e.code();
+    }
+    return 0;
+  };
+  EXPECT_EQ(code_of([](OneObject& o) { o.server.wrong_toggle = 2; }, true), co::abort::toggle);
+  EXPECT_EQ(code_of([](OneObject& o) { o.server.wrong_toggle = 2; }, false), co::abort::toggle);
+  // More than was announced.
+  Bus bus([](const can_frame& in, const auto& put) {
+    if (in.data[0] == 0x40) put(frame_of(0x585, {0x41, 0x10, 0x20, 2, 9}));
+    if (in.data[0] >> 5 == 3) put(frame_of(0x585, {in.data[0] & 0x10U, 1, 2, 3, 4, 5, 6, 7}));
+  });
+  SdoClient client(bus.near(), node, milliseconds(300));
+  try {
+    client.upload({0x2010, 2});
+    FAIL();
+  } catch (const SdoAbort& e) {
+    EXPECT_EQ(e.code(), co::abort::too_long);
+  }
+}
+
+/// The object dictionary of a controller.
+struct Device : fake::Controller {
+  SdoServer server;
+  std::uint32_t argument = 0;
+  Bytes answer_bytes = Bytes(wire::probe_response_bytes);
+
+  Device() {
+    constexpr auto little = wire::ByteOrder::little;
+    server.read = [this](ObjectAddress o, Bytes& out) -> std::uint32_t {
+      if (o.index == co::capability) return out = capability_record(little), 0;
+      if (o.index == co::status) return out = status_record(little), 0;
+      if (o.index == co::robot && tells_robot) return out = robot_record(little), 0;
+      if (o.index == co::image && o.sub == co::image_active) return out = active, 0;
+      if (o.index == co::probe && o.sub == co::probe_response) return out = answer_bytes, 0;
+      return co::abort::no_object;
+    };
+    server.wrote = [this](ObjectAddress o, const Bytes& in) -> std::uint32_t {
+      const auto code = [this](wire::Answer a) {
+        return co::abort_code(a, static_cast<Refusal>(status.refusal));
+      };
+      if (o.index == co::image) {
+        const wire::Answer a = run(wire::Command::begin, static_cast<std::uint32_t>(in.size()));
+        staged = in;
+        return code(a);
+      }
+      if (o.index == co::command && o.sub == co::command_argument) return argument = load_u32(in.data()), 0;
+      if (o.index == co::command) return code(run(static_cast<wire::Command>(load_u16(in.data())), argument));
+      if (o.index == co::probe) {
+        wire::ProbeRequest request;
+        wire::decode(in.data(), little, request);
+        wire::encode(probe(request), little, answer_bytes.data());
+        return 0;
+      }
+      return co::abort::no_object;
+    };
+  }
+};
+
+const BusAddress address{CanAddress{"vcan9", node}};
+
+ClientOptions quick() {
+  ClientOptions out;
+  out.patience = milliseconds(600);
+  out.working = milliseconds(500);
+  return out;
+}
+
+TEST(CanopenClient, PushesAndReadsBack) {
+  Device device;
+  device.working_polls = 3;
+  Bus bus(std::ref(device.server));
+  const auto client = connect_canopen(address, quick(), bus.give());
+  EXPECT_EQ(client->capability().terms, 64);
+  const Bytes image = numbered_bytes(1001);
+  std::size_t reported = 0;
+  PushOptions options;
+  options.progress = [&reported](std::size_t done, std::size_t) { reported = done; };
+  push_image(*client, image, options);
+  EXPECT_EQ(device.active, image);
+  EXPECT_EQ(reported, image.size());
+  EXPECT_EQ(next_sequence(*client), 2U);
+}
+
+TEST(CanopenClient, LosesOneFrameAndGoesOn) {
+  // Each answer of a push in turn is lost, but not the one to a command, which must not be given twice.
+  for (const int lost : {0, 5, 40, 100, 150}) {
+    Device device;
+    device.server.drop_answer = lost;
+    Bus bus(std::ref(device.server));
+    const auto client = connect_canopen(address, quick(), bus.give());
+    const Bytes image = numbered_bytes(1001);
+    push_image(*client, image);
+    EXPECT_EQ(device.active, image) << lost;
+  }
+}
+
+TEST(CanopenClient, SaysWhyASetWasRefused) {
+  Device device;
+  device.verify_refuses = Refusal::unknown_basis;
+  Bus bus(std::ref(device.server));
+  const auto client = connect_canopen(address, quick(), bus.give());
+  try {
+    push_image(*client, numbered_bytes(100));
+    FAIL();
+  } catch (const RefusedByController& e) {
+    EXPECT_EQ(e.refusal(), Refusal::unknown_basis);
+    EXPECT_STREQ(
+        e.what(),
+        "can:vcan9:5: asked to verify the set, the controller refused: the image has a basis that the "
+        "controller does not evaluate (basis 23) (SDO abort 0604 0043, general parameter incompatibility at "
+        "0x2011:2)");
+  }
+  EXPECT_TRUE(device.active.empty());
+  EXPECT_TRUE(device.staged.empty());
+}
+
+TEST(CanopenClient, WaitsForABusyControllerButNotForEver) {
+  Device device;
+  device.busy = 3;
+  Bus bus(std::ref(device.server));
+  const auto client = connect_canopen(address, quick(), bus.give());
+  push_image(*client, numbered_bytes(50));
+  EXPECT_EQ(device.active.size(), 50U);
+  device.busy = 1000000;
+  try {
+    push_image(*client, numbered_bytes(60));
+    FAIL();
+  } catch (const RefusedByController& e) {
+    EXPECT_EQ(e.answer(), wire::Answer::busy);
+    EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s"));
+  }
+  device.busy = 0;
+  device.working_polls = 1000000;
+  EXPECT_THROW(client->run(wire::Command::commit), NoAnswer);
+}
+
+TEST(CanopenClient, ProbesWithAllBits) {
+  Device device;
+  Bus bus(std::ref(device.server));
+  const auto client = connect_canopen(address, quick(), bus.give());
+  wire::ProbeRequest request;
+  for (std::size_t j = 0; j < 6; ++j) request.q_rad[j] = bits_of(0.1 * static_cast<double>(j) + 1e-17);
+  request.payload_kg = bits_of(1.0 / 3);
+  request.relative_speed[5] = bits_of(-0.7);
+  const wire::ProbeResponse response = client->probe(request);
+  EXPECT_EQ(response.q_rad[3], bits_of((0.1 * 3 + 1e-17) / 2));
+  EXPECT_EQ(response.position_m, bits_of(1.0 / 3));
+  EXPECT_EQ(response.orientation_rad, bits_of(-0.7));
+  EXPECT_EQ(response.status, 1);
+}
+
+TEST(CanopenClient, SaysWhoDidNotAnswer) {
+  Bus bus([](const can_frame&, const auto&) {});
+  const auto start = steady_clock::now();
+  try {
+    connect_canopen(address, quick(), bus.give());
+    FAIL();
+  } catch (const NoAnswer& e) {
+    EXPECT_STREQ(e.what(),
+                 "can:vcan9:5: node 5 did not answer when asked to read object 0x2000:0 (3 waits of 0.20 s): "
+                 "no answer "
+                 "about 0x2000:0");
+  }
+  EXPECT_LT(steady_clock::now() - start, milliseconds(1500));
+}
+
+TEST(CanopenClient, RefusesWhatIsNoController) {
+  {
+    Device device;
+    device.capability.protocol = 0x0200;
+    Bus bus(std::ref(device.server));
+    EXPECT_THROW(connect_canopen(address, quick(), bus.give()), BusError);
+  }
+  SdoServer other;
+  other.read = [](ObjectAddress, Bytes& out) { return out = {1, 2, 3, 4}, 0U; };
+  Bus bus(std::ref(other));
+  try {
+    connect_canopen(address, quick(), bus.give());
+    FAIL();
+  } catch (const BusError& e) {
+    EXPECT_STREQ(e.what(), "can:vcan9:5: object 0x2000:0 of node 5 has 4 bytes, expected 128");
+  }
+}
+
+TEST(CanopenClient, TellsTheRobotOrAsksForIt) {
+  Device device;
+  Bus bus(std::ref(device.server));
+  const auto client = connect_canopen(address, quick(), bus.give());
+  const Robot robot = robot_of(*client, "");
+  EXPECT_EQ(robot.name, "fake");
+  EXPECT_EQ(robot.nominal.links[1].a_m, 0.4);
+  EXPECT_EQ(robot.nominal.name_hash, device.capability.name_hash);
+  device.robot.links[1].a_m = 0.41;
+  EXPECT_THROW(robot_of(*client, ""), BusError);
+  device.tells_robot = false;
+  try {
+    robot_of(*client, "");
+    FAIL();
+  } catch (const BusError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("give its file with --robot"));
+  }
+}
+
+}  // namespace
+}  // namespace flexcomp::host

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A controller that does what a test tells it to: just enough of the parameter store to answer the clients.
+#ifndef FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
+#define FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "flexcomp/bytes.hpp"
+#include "flexcomp/robot.hpp"
+#include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/store_state.hpp"
+
+namespace flexcomp::fake {
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct Controller {
+  wire::Capability capability;
+  wire::Status status;
+  NominalRobot<6> robot;
+  std::string name = "fake";
+  bool tells_robot = true;
+  Bytes staged;
+  Bytes active;
+
+  // What goes wrong.
+  Refusal verify_refuses = Refusal::none;
+  wire::Answer commit_ends = wire::Answer::accepted;
+  int busy = 0;           ///< so many commands are answered busy
+  int working_polls = 0;  ///< so many status records say that memory is being written
+  bool damages_image = false;
+  bool overtaken = false;  ///< another client's command is answered before ours is looked at
+
+  Controller() {
+    robot.links[1].a_m = 0.4;
+    capability.joints = 6;
+    capability.scalar_bytes = 8;
+    capability.schema = 0x0100;
+    capability.bases = 0x3FFFF;
+    capability.terms = 64;
+    capability.tables = 8;
+    capability.values = 768;
+    capability.image_bytes = 12288;
+    capability.cycle_us = 1000;
+    capability.nominal_hash = nominal_hash(robot);
+    capability.name_hash = name_hash(name.data(), name.size());
+  }
+
+  wire::Answer answer(wire::Answer a, Refusal r = Refusal::none, std::uint32_t detail = 0) {
+    status.answer = static_cast<std::uint16_t>(a);
+    status.refusal = static_cast<std::uint16_t>(r);
+    status.detail = detail;
+    return a;
+  }
+
+  wire::Answer run(wire::Command command, std::uint32_t argument) {
+    using wire::Answer;
+    if (busy > 0) {
+      --busy;
+      return answer(Answer::busy);
+    }
+    switch (command) {
+      case wire::Command::begin:
+        staged.assign(argument, 0);
+        return answer(Answer::accepted);
+      case wire::Command::verify:
+        if (verify_refuses != Refusal::none) return answer(Answer::refused, verify_refuses, 23);
+        return answer(Answer::accepted);
+      case wire::Command::commit:
+        if (commit_ends == Answer::accepted) {
+          active = staged;
+          if (damages_image) active[active.size() / 2] ^= 1U;
+          status.active_slot = 0;
+          status.active_bytes = static_cast<std::uint32_t>(active.size());
+          ++status.active_sequence;
+        }
+        answer(overtaken ? Answer::busy : commit_ends);
+        return Answer::accepted;
+      case wire::Command::abort:
+        staged.clear();
+        return Answer::accepted;
+      case wire::Command::rollback:
+        return answer(Answer::no_previous);
+      default:
+        return answer(Answer::unknown_command);
+    }
+  }
+
+  wire::Status now() {
+    wire::Status out = status;
+    if (working_polls > 0) {
+      --working_polls;
+      out.state = static_cast<std::uint16_t>(wire::StoreState::working);
+    }
+    return out;
+  }
+
+  /// Recognisable: half of each joint, and bits that only a binary64 has.
+  wire::ProbeResponse probe(const wire::ProbeRequest& request) const {
+    wire::ProbeResponse out;
+    for (std::size_t j = 0; j < 6; ++j) out.q_rad[j] = bits_of(double_of(request.q_rad[j]) / 2);
+    out.position_m = request.payload_kg;
+    out.orientation_rad = request.relative_speed[5];
+    out.status = 1;
+    out.sequence = status.active_sequence;
+    return out;
+  }
+
+  Bytes capability_record(wire::ByteOrder order) const {
+    Bytes out(wire::capability_bytes);
+    wire::encode(capability, order, out.data());
+    return out;
+  }
+  Bytes status_record(wire::ByteOrder order) {
+    Bytes out(wire::status_bytes);
+    wire::encode(now(), order, out.data());
+    return out;
+  }
+  Bytes robot_record(wire::ByteOrder order) const {
+    Bytes out(wire::robot_record_bytes);
+    wire::encode(robot, name.data(), name.size(), order, out.data());
+    return out;
+  }
+};
+
+inline Bytes numbered_bytes(std::size_t size) {
+  Bytes out(size);
+  for (std::size_t k = 0; k < size; ++k) out[k] = static_cast<std::uint8_t>(k * 37U + (k >> 8U));
+  return out;
+}
+
+}  // namespace flexcomp::fake
+
+#endif
