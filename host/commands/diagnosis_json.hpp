@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A diagnosis for machines: the keys of contract.md, and more beside them.
+/// A diagnosis for machines: keys in docs/diagnosis.md.
 #ifndef FLEXCOMP_HOST_COMMANDS_DIAGNOSIS_JSON_HPP
 #define FLEXCOMP_HOST_COMMANDS_DIAGNOSIS_JSON_HPP
 

@@ -12,7 +12,7 @@ namespace flexcomp::host {
 
 namespace {
 
-/// Less than this share of a column left after the projection: the data cannot speak of it (effects.md).
+/// Less than this share of a column left after the projection: the data cannot speak of it (docs/model.md, M33).
 constexpr double nothing_left = 1e-3;
 
 /// Directions of a block of which something is left (the sum of a curve's splines is the offset of its joint).

@@ -23,7 +23,7 @@ struct LoadOptions {
       false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong
 };
 
-/// Reads measured data (contract.md, Data file).
+/// Reads measured data (docs/files.md, data file).
 /// A row whose |norm - 1| of the quaternion exceeds 1e-3 is refused, below that it is normalised.
 /// \throws InputError  file:line: column for: a missing column, an empty cell, what is not a finite number, a reading
 ///                     beyond its limit in the robot file, dir not -1, 0 or 1, a sigma that is not positive, a row that

@@ -39,7 +39,7 @@ Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size
 Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix);
 
 /// Preference where columns are confounded: frames, base x y rx ry, links 1 to 6, effects, and last what the paper loses
-/// too: base z, base rz, compliance of joint 1 (contract.md).
+/// too: base z, base rz, compliance of joint 1 (docs/model.md, section 8).
 std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set);
 
 /// Random poses inside the joint limits, measured as `like` was: same kind, and its contexts in turn.

@@ -67,7 +67,7 @@ Linearised linearised(const Estimate& estimate, const HostModel& model, const st
                       const Unknowns& unknowns);
 
 /// The fixed unit in which a parameter's size is judged, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link
-/// gravity, the usual size of the effect otherwise (model.md section 7, effects.md).
+/// gravity, the usual size of the effect otherwise (docs/model.md, section 7).
 double unit_of(const Parameter& parameter, const TermSet& set);
 
 /// Units of all unknowns, frames first.

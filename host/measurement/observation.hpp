@@ -33,7 +33,7 @@ struct Observation {
 };
 
 /// All rows of a data file as observations. Reflector points are fitted to the robot file's template, else to one that is
-/// estimated over all rows (its gauge, model.md section 6, is then part of E). Rows whose misfit has a probability below
+/// estimated over all rows (its gauge, docs/model.md, M23, is then part of E). Rows whose misfit has a probability below
 /// 1e-6 are named in `warnings`, with the reflector that moved, or those that may have (suspect_reflectors()).
 /// \throws InputError  nothing measured; reflectors on one line; a template without the D that the data have
 std::vector<Observation> observe(const MeasuredData& data, const Robot& robot,

@@ -63,7 +63,7 @@ bool is_measurement_effect(Effect effect);
 /// What is wrong with an id (joint out of range, order not positive, a link without length …), or nothing.
 std::optional<std::string> validation_error(const EffectId& id, const Nominal& robot);
 
-/// The keys of an effect on this arm in the order of effects.md.
+/// The keys of an effect on this arm in the order of docs/effects.md.
 /// \throws std::invalid_argument  validation_error()
 std::vector<EffectKey> keys(const EffectId& id, const Nominal& robot);
 

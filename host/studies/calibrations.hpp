@@ -58,7 +58,7 @@ class Experiment {
   Estimate calibrate_without_noise() const { return from(clean_); }
   Eigen::VectorXd values(const Estimate& estimate) const;  ///< of the fitted parameters, SI
 
-  /// max(0, 1 - |estimate - true| / |true|) of each fitted parameter (model.md section 5).
+  /// max(0, 1 - |estimate - true| / |true|) of each fitted parameter (docs/model.md, M50).
   Eigen::VectorXd scores(const Estimate& estimate) const;
 
   /// The mean score of estimates that are normal around the truth with the smallest covariance that unbiased ones can

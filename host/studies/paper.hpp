@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The arms of the paper's studies with their assumed true errors (Chen et al. 2019, Table 1; model.md section 2).
+/// The arms of the paper's studies with their assumed true errors (Chen et al. 2019, Table 1; docs/model.md, section 12).
 #ifndef FLEXCOMP_HOST_STUDIES_PAPER_HPP
 #define FLEXCOMP_HOST_STUDIES_PAPER_HPP
 

@@ -163,7 +163,7 @@ inline S moment_about(const Load<S>& load, const Vector3<S>& direction, const Ve
   return dot<S>(direction, load.moment - cross<S>(point, load.force));
 }
 
-/// Lever of the link's own weight (effects.md): z · ((far - p) × g_hat) / ‖part of (far - p) perpendicular to
+/// Lever of the link's own weight (docs/model.md, M13): z · ((far - p) × g_hat) / ‖part of (far - p) perpendicular to
 /// z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is under 1 mm.
 template <class S, std::size_t N>
 inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity, std::size_t joint,

@@ -5,7 +5,7 @@
 ///
 /// Two readings of one list. column() is the paper's H, first order: it leaves out that a geometric error
 /// also shifts torques and levers. exact_column() adds that, and is the true derivative of forward(); the two
-/// differ by (deflection / reach) of the column, see docs/model.md.
+/// differ by (deflection / reach) of the column, see docs/model.md, M19 and M20.
 #ifndef FLEXCOMP_IDENTIFICATION_HPP
 #define FLEXCOMP_IDENTIFICATION_HPP
 

@@ -56,7 +56,7 @@ enum class Basis : std::uint8_t {
   one = 0,                ///< 1: a geometric error
   load_torque = 1,        ///< tau_joint, N·m: torque of payload and external force about the joint's axis
   load_torque_cubed = 2,  ///< tau_joint^3
-  link_weight = 3,     ///< lever s of the link of `joint` (effects.md); `argument` = joint of the far point
+  link_weight = 3,     ///< lever s of the link of `joint` (docs/model.md, M13); `argument` = joint of the far point
   joint_position = 4,  ///< q_joint, rad
   sine = 5,            ///< sin(argument * q_joint)
   cosine = 6,          ///< cos(argument * q_joint)
@@ -92,7 +92,7 @@ enum class Covariate : std::uint8_t {
   relative_speed = 5,  ///< u_joint
 };
 
-/// The effect of the catalogue that a term belongs to (effects.md), so that a set can be read back into
+/// The effect of the catalogue that a term belongs to (docs/effects.md), so that a set can be read back into
 /// names. Registered here, on the wire, never reused.
 enum class Effect : std::uint8_t {
   geometric = 0,

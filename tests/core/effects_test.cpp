@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every effect of effects.md through the core's terms, against plain matrices that share no code with it.
+// Every effect of docs/effects.md through the core's terms, against plain matrices that share no code with it.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -48,7 +48,7 @@ plain::Situation situation_of(const flexcomp::Context<double>& c) {
   return s;
 }
 
-/// Effects by name to terms: the table of effects.md.
+/// Effects by name to terms: the table of docs/effects.md.
 arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nominal) {
   arms::TermSet<double> set;
   const auto index = [](int joint) { return static_cast<std::size_t>(joint - 1); };

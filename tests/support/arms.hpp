@@ -238,7 +238,7 @@ inline double cardinal_spline(double x) {
   return x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
 }
 
-/// The curve of a set of coefficients at reading q (rad), as effects.md defines it.
+/// The curve of a set of coefficients at reading q (rad), as docs/model.md, M6 defines it.
 inline double curve_value(const std::vector<double>& coefficients, double q) {
   const double m = static_cast<double>(coefficients.size());
   const double pi = 3.14159265358979323846;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The flexible arm of model.md and effects.md as 4x4 matrices, one after the other: slow, obvious, and without a
+/// The flexible arm of docs/model.md and docs/effects.md as 4x4 matrices, one after the other: slow, obvious, and without a
 /// line of the core. SI units: m, rad, kg, N, N·m, K, s. Joints and links are counted from 1, as in the files.
 #ifndef FLEXCOMP_TESTS_SUPPORT_PLAIN_ARM_HPP
 #define FLEXCOMP_TESTS_SUPPORT_PLAIN_ARM_HPP
@@ -82,7 +82,7 @@ struct Situation {
   std::array<double, 6> relative_speed{};
 };
 
-// The effects by the names and keys of effects.md, angles in rad.
+// The effects by the names and keys of docs/effects.md, angles in rad.
 struct JointCompliance {
   int joint;
   double rad_per_nm;

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Stack, flash and RAM of the firmware library on one target, against the table in docs/targets.md.
+"""Stack, flash, RAM and instructions of the firmware library on one target, against docs/figures.json.
 
-  figures.py check  --doc D.md --target cortex-m7 --build DIR --tools arm-none-eabi-
-  figures.py update (the same): writes what it measures into the target's column
+  figures.py check  --figures F.json --target cortex-m7 --build DIR --tools arm-none-eabi-
+  figures.py update (the same): writes what it measures into the target's column, and the tables that show it
+  figures.py instructions check|update --figures F.json --target cortex-m7 -- EMULATOR… IMAGE: the same of instructions
   figures.py speed  --build DIR --tools arm-none-eabi-: the step's functions are compiled for speed, all of them
   figures.py run    --build DIR --tools arm-none-eabi- -- EMULATOR… IMAGE: stack taken in a run against the worst
   figures.py stack  --ci A.ci [--ci B.ci] --entry NAME [--limit BYTES]: the worst stack below one function
@@ -19,6 +20,10 @@ import pathlib
 import re
 import subprocess
 import sys
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "docs"))
+import write_tables
 
 # Indirect calls, by the function that makes them. The library has no virtual functions; it calls hooks, some of them
 # through a function of flexcomp_c.cpp that unpacks the caller's. `[]`: the caller's own function, whose stack comes on
@@ -38,8 +43,6 @@ STEP = {"control", "arithmetic"}
 NOT_OF_THE_STEP = r"float_from_bits|bits_from_float"
 # Never returns, so nothing comes back to a stack above it.
 END_OF_ALL = {"flexcomp_fault"}
-
-BEGIN, END = "<!-- figures -->", "<!-- end of figures -->"
 
 
 class Refused(Exception):
@@ -224,27 +227,13 @@ def speed(args):
     return 1 if shared else 0
 
 
-def read_table(text, name="figures"):
-    """The header of a table of the document, and its rows by name."""
-    begin, end = text.index(f"<!-- {name} -->"), text.index(f"<!-- end of {name} -->")
-    lines = [line for line in text[begin:end].splitlines() if line.startswith("|")]
-    cells = lambda line: [c.strip() for c in line.strip().strip("|").split("|")]
-    return cells(lines[0]), {cells(line)[0].strip("`"): cells(line) for line in lines[2:]}
-
-
-def number(cell):
-    return int(cell.replace(",", "")) if re.fullmatch(r"[\d,]+", cell) else None
-
-
-def compare(args, figures, table, target_name):
-    """Against the document: 1 where a figure has grown by more than 2 % or is above its limit."""
-    header, rows = read_table(pathlib.Path(args.doc).read_text(), table)
-    column, goal = header.index(args.target), header.index("at most")
+def compare(args, figures, table, update_target):
+    """Against docs/figures.json: 1 where a figure has grown by more than 2 % or is above its limit."""
+    rows = {row["figure"]: row for row in write_tables.load(args.figures)[table]["rows"]}
     bad = 0
     for name, value in figures.items():
-        row = rows.get(name)
-        documented = number(row[column]) if row else None
-        limit = number(row[goal]) if row else None
+        row = rows.get(name, {})
+        documented, limit = row.get(args.target), row.get("limit")
         verdict = "ok"
         if documented is None:
             verdict = "NOT DOCUMENTED"
@@ -253,41 +242,36 @@ def compare(args, figures, table, target_name):
         elif limit is not None and value > limit:
             verdict = "ABOVE its limit"
         elif value < documented * 0.9:
-            verdict = "ok (far below: the table could be written anew)"
+            verdict = "ok (far below: the figure could be written anew)"
         bad += not verdict.startswith("ok")
         print(f"{name:40} {value:7} documented {documented} at most {limit}: {verdict}")
     if bad:
-        print(f"{bad} figures are not as {args.doc} says; \"cmake --build --preset {args.target} --target {target_name}\""
-              " writes them anew")
+        print(f"{bad} figures are not as {args.figures} says; \"cmake --build --preset {args.target} --target"
+              f" {update_target}\" writes them anew")
     return 1 if bad else 0
 
 
 def write(args, figures, table):
-    doc = pathlib.Path(args.doc)
-    text = doc.read_text()
-    header, rows = read_table(text, table)
-    column = header.index(args.target)
+    documented = write_tables.load(args.figures)
+    rows = {row["figure"]: row for row in documented[table]["rows"]}
     missing = [name for name in figures if name not in rows]
     if missing:
         print("rows that the table does not have: " + ", ".join(missing))
         return 1
     for name, value in figures.items():
-        cells = list(rows[name])
-        cells[column] = f"{value:,}"
-        old = re.compile(r"^\|\s*`" + re.escape(name) + r"`\s*\|.*$", re.M)
-        text = old.sub("| " + " | ".join(cells) + " |", text, count=1)
-    doc.write_text(text)
-    return 0
+        rows[name][args.target] = value
+    write_tables.save(documented, args.figures)
+    return write_tables.main([])
 
 
 def check(args):
     figures, _ = measure(args.build, args.tools)
-    return compare(args, figures, "figures", "figures")
+    return compare(args, figures, "target_bytes", "figures")
 
 
 def update(args):
     figures, ways = measure(args.build, args.tools)
-    if write(args, figures, "figures"):
+    if write(args, figures, "target_bytes"):
         return 1
     for entry, way in ways.items():
         print(f"flexcomp_{entry}: " + " > ".join(way))
@@ -303,8 +287,8 @@ def instructions(args):
         print(run.stdout)
         raise Refused(f"the image ended with status {run.returncode}")
     if args.what == "update":
-        return write(args, figures, "instructions")
-    return compare(args, figures, "instructions", "instructions")
+        return write(args, figures, "target_instructions")
+    return compare(args, figures, "target_instructions", "instructions")
 
 
 def stack(args):
@@ -324,7 +308,7 @@ def main():
     commands = parser.add_subparsers(required=True)
     for name, run in (("check", check), ("update", update)):
         command = commands.add_parser(name)
-        for option in ("--doc", "--target", "--build", "--tools"):
+        for option in ("--figures", "--target", "--build", "--tools"):
             command.add_argument(option, required=True)
         command.set_defaults(run=run)
     command = commands.add_parser("speed")
@@ -338,7 +322,7 @@ def main():
     command.set_defaults(run=in_a_run)
     command = commands.add_parser("instructions")
     command.add_argument("what", choices=("check", "update"))
-    for option in ("--doc", "--target"):
+    for option in ("--figures", "--target"):
         command.add_argument(option, required=True)
     command.add_argument("command", nargs="+")
     command.set_defaults(run=instructions)

@@ -27,7 +27,7 @@ const Robot& tx60l() {
   return robot;
 }
 
-// Every key of effects.md.
+// Every key of docs/effects.md.
 const std::string full =
     "robot: staubli-tx60l\n"                                                                             // 1
     "geometric:\n"                                                                                       // 2

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The model sizes of the paper (Fig. 3, Fig. 4, Table 3; model.md section 5) come out of one rank routine, on their own.
+// The model sizes of the paper (Fig. 3, Fig. 4, Table 3; docs/model.md, section 8) come out of one rank routine, on their own.
 #include <gtest/gtest.h>
 
 #include <algorithm>

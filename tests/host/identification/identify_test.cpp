@@ -70,7 +70,7 @@ TEST(Identify, NoiseFreePosesGiveThePapersErrorsBack) {
   EXPECT_EQ(compared, 36U);
 }
 
-// model.md section 5, checked: 14 random poses, N1, whitened least squares: mean score of the 36 is 0.82 +- 0.01.
+// docs/model.md, M50: 14 random poses, N1, whitened least squares: mean score of the 36 is 0.82 +- 0.01.
 TEST(Identify, ScoreOf14RandomPosesIsThePapers) {
   const Robot robot = tx60l();
   std::map<std::string, double> true_value;

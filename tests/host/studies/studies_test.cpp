@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The studies against what is known of them (model.md sections 2, 5 and 9) and against themselves.
+// The studies against what is known of them (docs/model.md, sections 8 and 12, and docs/studies.md) and against themselves.
 #include "studies/study.hpp"
 
 #include <gtest/gtest.h>
@@ -183,7 +183,7 @@ TEST(Planned, OurPlanRaisesTheLimitToWhatIsKnownOfTheSetUp) {
   ExperimentOptions n2;
   n2.noise = noise_n2;
   const auto plan = planned_poses(arm, 14, Planning::ours, 1);
-  EXPECT_NEAR(Experiment(arm, plan, n1).cramer_rao_score(), 0.86, 0.01) << "model.md section 5";
+  EXPECT_NEAR(Experiment(arm, plan, n1).cramer_rao_score(), 0.86, 0.01) << "docs/model.md, section 12";
   EXPECT_NEAR(Experiment(arm, plan, n2).cramer_rao_score(), 0.78, 0.01);
   if (kSanitized) return;
   StudiedArm heavy = arm;
