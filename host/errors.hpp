@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The ways in which the calibrator gives up, and the exit status of each (main.cpp maps them, nobody else).
+/// Failures of the calibrator and the exit status of each (mapped in main.cpp only).
 #ifndef FLEXCOMP_HOST_ERRORS_HPP
 #define FLEXCOMP_HOST_ERRORS_HPP
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A range of values that holds the true one with a probability.
+/// Confidence interval.
 #ifndef FLEXCOMP_HOST_INTERVAL_HPP
 #define FLEXCOMP_HOST_INTERVAL_HPP
 

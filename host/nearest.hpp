@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// "Did you mean": the known name that an unknown one was probably meant to be.
+/// Nearest known name by edit distance, for "did you mean" messages.
 #ifndef FLEXCOMP_HOST_NEAREST_HPP
 #define FLEXCOMP_HOST_NEAREST_HPP
 

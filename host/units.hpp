@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The units that files for people use, and the one way from text to SI and back. Inside everything is SI.
+/// Units of files, and conversion between text and SI. Inside everything is SI.
 #ifndef FLEXCOMP_HOST_UNITS_HPP
 #define FLEXCOMP_HOST_UNITS_HPP
 
@@ -13,7 +13,7 @@ namespace flexcomp::host {
 /// A file's unit as the exact ratio SI = file * multiply / divide. A ratio, because 1/1000 has no exact binary form:
 /// 70 mm must become the double nearest to 0.07.
 struct Unit {
-  std::string_view name;  ///< as people write it, e.g. "mm"; empty for SI itself
+  std::string_view name;  ///< e.g. "mm"; empty for SI itself
   long double multiply = 1;
   long double divide = 1;
 

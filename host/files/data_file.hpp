@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Measured data and targets: joint readings, what was measured there, and the context in which it was.
+/// Reads and writes measured data and targets (docs/files.md).
 #ifndef FLEXCOMP_HOST_FILES_DATA_FILE_HPP
 #define FLEXCOMP_HOST_FILES_DATA_FILE_HPP
 
@@ -40,17 +40,17 @@ std::string data_text(const MeasuredData& data);
 /// Writes data_text() atomically. \throws std::runtime_error where the file cannot be written
 void save_data(const std::string& path, const MeasuredData& data);
 
-/// The columns that say under which circumstances a row was measured: payload_kg, move1_deg …, temp_c, fx_n …; not time_s.
+/// Names of the context columns: payload_kg, move1_deg …, temp_c, fx_n …; not time_s.
 const std::vector<std::string>& context_names();
 
-/// A column of this name holds what the point was called where it was measured: passed through without a warning.
+/// A column of this name holds the instrument's name of the point: passed through without a warning.
 constexpr const char* point_label = "point";
 
 /// Names and cells of joints and context as in a data file, for files that begin with the same columns.
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns);
 std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row);
 
-/// Where the tool shall go.
+/// A target of compensation: joint command or tool pose.
 struct Target {
   std::size_t line = 0;
   std::array<double, joint_count> q_rad{};  ///< command; for a pose, the seed that chooses the branch

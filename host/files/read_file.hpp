@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The bytes of a file that a user named.
+/// Reads a whole file.
 #ifndef FLEXCOMP_HOST_FILES_READ_FILE_HPP
 #define FLEXCOMP_HOST_FILES_READ_FILE_HPP
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What readers of text do to a piece of it.
+/// Helpers for text readers.
 #ifndef FLEXCOMP_HOST_FILES_TEXT_HPP
 #define FLEXCOMP_HOST_FILES_TEXT_HPP
 

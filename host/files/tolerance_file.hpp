@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is known of an arm before it is measured: how far from its drawing each parameter may be.
+/// Reads tolerance files: prior standard deviations of the parameters' differences from nominal (docs/files.md).
 #ifndef FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
 #define FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
 
@@ -26,8 +26,8 @@ struct Tolerance {
 /// \throws InputError  no such file, no YAML, an unknown key, a sigma that is not above 0
 std::vector<Tolerance> load_tolerances(const std::string& path);
 
-/// Indices of the parameters that a tolerance speaks of.
-/// \throws InputError  with file and line where it speaks of none
+/// Indices of the parameters whose names match the tolerance's pattern.
+/// \throws InputError  with file and line where none matches
 std::vector<std::size_t> parameters_meant(const Tolerance& tolerance,
                                           const std::vector<Parameter>& parameters);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Files appear whole or not at all.
+/// Writes files atomically.
 #ifndef FLEXCOMP_HOST_FILES_WRITE_FILE_HPP
 #define FLEXCOMP_HOST_FILES_WRITE_FILE_HPP
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A node of a YAML file that knows where it stands, so that whatever is wrong with it can be said with file, line and
-/// field.
+/// A YAML node with its file, line and field path for error messages.
 #ifndef FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
 #define FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Numbers and names as text that every reader of YAML takes for what they are.
+/// Formats numbers and strings as YAML.
 #ifndef FLEXCOMP_HOST_FILES_YAML_TEXT_HPP
 #define FLEXCOMP_HOST_FILES_YAML_TEXT_HPP
 

@@ -16,9 +16,9 @@ namespace flexcomp::host {
 struct EstimatorOptions {
   double upsilon = 10;  ///< step length coefficient of the damping; 4 … 100 all work (the paper)
   int largest_iterations = 200;
-  bool robust = true;  ///< false: every row counts in full
+  bool robust = true;  ///< false: every row has weight 1
   bool spectrum =
-      true;  ///< false: Fit::singular_values are not wanted (they cost the most where unknowns are many)
+      true;  ///< false: Fit::singular_values are not wanted (the most expensive part where unknowns are many)
   /// Called after each accepted step with the iteration and the cost; may be empty.
   std::function<void(int, double)> progress;
 };
@@ -27,13 +27,14 @@ struct Fit {
   Estimate estimate;
   bool converged = false;  ///< the exact gradient vanishes, see newton_decrement
   int iterations = 0;      ///< accepted steps
-  /// What a full Gauss-Newton step within the bounds would still gain, in units of chi-square: below 1e-8 is converged.
+  /// Newton decrement: decrease of chi-square that a full Gauss-Newton step within the bounds predicts; converged
+  /// below 1e-8.
   double newton_decrement = 0;
-  double chi2 = 0;  ///< sum of squared whitened residuals of the rows that count in full
+  double chi2 = 0;  ///< sum of squared whitened residuals of the rows with weight 1
   double degrees_of_freedom = 0;
-  /// Standard deviation of the whitened residual as the bulk of the rows shows it; 1 where the model explains the data.
+  /// Robust scale (standard deviation) of the whitened residuals; 1 where the model explains the data.
   double scale = 1;
-  std::vector<double> weight;  ///< per row: 1 in full, less for outliers
+  std::vector<double> weight;  ///< per row: 1, less for down-weighted outliers
   /// Covariance of the unknowns in units_of(), prior included, bounds left out; from the declared noise, or from the
   /// residuals where chi-square says that the noise alone does not explain them.
   Eigen::MatrixXd covariance;
@@ -50,10 +51,9 @@ struct Fit {
 /// Fits `unknowns`, starting at `start`. The derivative (with the priors as further rows) must have full column rank:
 /// eliminate() first.
 ///
-/// Whitened throughout: metres and radians never meet unweighted. Robust loss: a row counts in full up to the 99.9 %
-/// quantile of its chi-square around the scale of the bulk, beyond it with weight (quantile / square): gross outliers
-/// lose their pull, and Gaussian data lose nothing. Bounds are kept by every step (active set), and the proof of
-/// convergence is that of the bounded problem.
+/// All residuals are whitened. Robust loss: a row has weight 1 up to the 99.9 % quantile of its chi-square at the robust
+/// scale, beyond it weight (quantile / square). Every step keeps the bounds (active set); convergence is tested on the
+/// bounded problem.
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const Robot& robot, const EstimatorOptions& options = {});
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a fit has found, as a calibration.
+/// Converts a fit to a calibration.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_FITTED_CALIBRATION_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_FITTED_CALIBRATION_HPP
 
@@ -12,7 +12,7 @@
 namespace flexcomp::host {
 
 /// Terms, their uncertainty, frames (where `fitted` moves them), covariance, bounds; stamped. Terms that were neither
-/// fitted nor given (coefficient zero) say nothing and are left out.
+/// fitted nor given (coefficient zero) are left out.
 Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot);
 
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Where the measurement frame lies (F) and what point of the tool was measured (E): both of any size.
+/// Estimates the measurement frames F (robot base in the instrument's frame) and E (measured point in Ftool), Eq. (M2).
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_FRAMES_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_FRAMES_HPP
 
@@ -13,10 +13,10 @@ namespace flexcomp::host {
 
 enum class FrameChoice { by_distance, nominal, fit };
 
-/// Closed-form start and robust refinement of F and E for a given set of terms (none: the nominal arm).
+/// Estimates F and E for given terms (none: the nominal arm): closed-form start, then robust refinement.
 Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot);
 
-/// True where the nominal frames (F = E = 1) are off by more than 20 mm or 2 degrees in the median row.
+/// True where the nominal frames (F = E = 1) miss the median row by more than 20 mm or 2 degrees.
 bool nominal_frames_are_off(const std::vector<RowResidual>& nominal, const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which parameters can be known at all, which cannot, and with what each lost one is confounded.
+/// Identifiability: rank of the identification matrix, and what each dependent column is confounded with.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
 
@@ -14,11 +14,11 @@
 
 namespace flexcomp::host {
 
-/// A column of which less is left after projection on the others counts as confounded with them: a tool point 0.2 mm off
-/// axis 6, as fitted, does not make known what a point on the axis cannot know.
+/// Relative norm after projection onto the other columns below which a column counts as confounded with them. A fitted
+/// tool point 0.2 mm off axis 6 stays below it, as a point on the axis does.
 constexpr double structural_tolerance = 1e-3;
 
-/// A column that adds nothing to those before it, and the earlier ones that carry it (empty: it is zero).
+/// A column that depends linearly on earlier ones, and those (empty: the column is zero).
 struct LostColumn {
   std::size_t column = 0;
   std::vector<std::size_t> with;
@@ -30,7 +30,7 @@ struct Elimination {
 };
 
 /// Orthogonalises the columns in the given order and drops each one of which less than `tolerance` of its norm is left
-/// after projection onto those kept. Columns are scaled to norm 1 first, so nothing depends on noise or units.
+/// after projection onto those kept. Columns are scaled to norm 1 first, so the result depends on neither noise nor units.
 Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size_t>& order,
                       double tolerance = 1e-6);
 
@@ -38,8 +38,8 @@ Elimination eliminate(const Eigen::MatrixXd& matrix, const std::vector<std::size
 /// that rank, confounding and information of the columns depend on.
 Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix);
 
-/// Preference where columns are confounded: frames, base x y rx ry, links 1 to 6, effects, and last what the paper loses
-/// too: base z, base rz, compliance of joint 1 (docs/model.md, section 8).
+/// Order in which columns are kept where they are confounded: frames, base x y rx ry, links 1 to 6, effects, and last
+/// base z, base rz and the compliance of joint 1, which the paper eliminates too (docs/model.md, section 8).
 std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermSet& set);
 
 /// Random poses inside the joint limits, measured as `like` was: same kind, and its contexts in turn.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From measured rows to a calibration: what can be known, its values, and how far to trust them.
+/// Identifies a calibration from measured rows: identifiable parameters, estimates, uncertainty.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
 
@@ -33,7 +33,7 @@ struct IdentifyOptions {
   std::vector<Tolerance> tolerances;  ///< of parameters by name; later ones win
   bool physical = true;               ///< compliances are kept at or above zero
   bool force = false;                 ///< go on where the data look like another unit or another arm
-  std::uint64_t seed = 1;             ///< of the 1,000 random poses that say what such data could know
+  std::uint64_t seed = 1;             ///< of the 1,000 random reference poses of the identifiability analysis
   EstimatorOptions estimator;
 };
 
@@ -47,7 +47,7 @@ struct Identification {
   std::size_t parameters = 0;    ///< of the model, without F and E
   std::size_t identifiable = 0;  ///< of these, in these data
   std::size_t frame_parameters = 0;
-  Identifiability known;  ///< what these data know, what they lack, and what would cure it
+  Identifiability known;  ///< what these data identify, what they do not, and poses that would
   Fit fit;                ///< of known.fitted
   double condition = 0;   ///< of the whitened, scaled columns of the parameters
   double o1 = 0;          ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
@@ -55,7 +55,7 @@ struct Identification {
   ErrorStatistics after;
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where the model has them, per row
   std::vector<RowResidual> residuals;  ///< after, per row
-  std::vector<std::size_t> outliers;   ///< rows that do not count in full, by index
+  std::vector<std::size_t> outliers;   ///< down-weighted rows, by index
   std::optional<PureError>
       pure_error;  ///< of repeated rows, outliers left out; nothing where none are repeated
   /// Why the result must not be relied on; empty where it may.

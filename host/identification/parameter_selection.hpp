@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What rows of a kind can know, what these rows know of it, and which poses would tell the rest.
+/// Selects the identifiable parameters of measured rows and suggests poses that identify the others.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_PARAMETER_SELECTION_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_PARAMETER_SELECTION_HPP
 
@@ -16,13 +16,13 @@
 
 namespace flexcomp::host {
 
-/// A pose worth measuring.
+/// A pose whose measurement identifies a missing parameter.
 struct SuggestedPose {
   std::array<double, joint_count> q_rad{};
   double payload_kg = 0;
 };
 
-/// A parameter that other payloads would make known better.
+/// A parameter that a second payload would identify better.
 struct PayloadGain {
   std::string parameter;
   double sigma = 0;            ///< SI, expected from these rows
@@ -30,22 +30,23 @@ struct PayloadGain {
 };
 
 struct Identifiability {
-  Unknowns fitted;                     ///< what these rows know
-  std::vector<Confounded> confounded;  ///< cannot be told apart by any rows of this kind
-  std::vector<std::string> missing;    ///< known to 1,000 random poses of this kind, but not to these rows
-  /// Poses that would make the missing ones known, best first; empty where nothing is missing.
+  Unknowns fitted;                     ///< identifiable from these rows
+  std::vector<Confounded> confounded;  ///< not separable by any rows of this kind
+  std::vector<std::string>
+      missing;  ///< identifiable from 1,000 random poses of this kind, but not from these rows
+  /// Poses that would identify the missing parameters, best first; empty where none is missing.
   std::vector<SuggestedPose> cure;
-  std::vector<PayloadGain> payload_gains;  ///< where all rows have one payload; worst known first
+  std::vector<PayloadGain> payload_gains;  ///< where all rows have one payload; largest sigma first
 };
 
-/// Judges the columns of `all` at `start`. Rows "of this kind" measure the same (poses, positions) in the same contexts;
+/// Analyses the identifiability of the unknowns `all` at the estimate `start`. Rows "of this kind" measure the same (poses, positions) in the same contexts;
 /// where every row is without payload though the robot file has one, half of them have it.
-/// Missing parameters that have a tolerance stay in `fitted`: the tolerance holds them.
+/// Missing parameters that have a tolerance stay in `fitted`: the tolerance is their prior.
 Identifiability analyse_identifiability(const Robot& robot, const std::vector<Observation>& rows,
                                         const Estimate& start, const Unknowns& all, std::uint64_t seed);
 
-/// Columns of the identification matrix that 1,000 random rows like these tell apart, by index into `all` (frames
-/// first), and those that are lost with what carries them. A property of the arm and the kind of measurement.
+/// Columns of the identification matrix that 1,000 random rows of this kind separate, by index into `all` (frames
+/// first), and the confounded ones. Depends on the arm and the kind of measurement only.
 Elimination possible_columns(const Robot& robot, const std::vector<Observation>& like, const Estimate& start,
                              const Unknowns& all, std::uint64_t seed);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is known of parameters before anything is measured.
+/// Priors of parameters: physical bounds and tolerances.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
 
@@ -19,8 +19,8 @@ struct PriorKnowledge {
   double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
 };
 
-/// One per parameter. \param physical  a torque turns a joint its own way: compliances are 0 or more
-/// \throws InputError  a tolerance that speaks of no parameter; of two that speak of one the later wins
+/// One per parameter. \param physical  a joint deflects in the direction of the torque: compliances are 0 or more
+/// \throws InputError  a tolerance that matches no parameter; of two that match one the later applies
 std::vector<PriorKnowledge> prior_knowledge(const TermSet& set, const std::vector<Parameter>& parameters,
                                             bool physical, const std::vector<Tolerance>& tolerances);
 

@@ -17,19 +17,19 @@
 
 namespace flexcomp::host {
 
-/// Everything that a fit moves: the coefficients, and the frames of the measurement.
+/// Estimate: the coefficients of all terms and the measurement frames.
 struct Estimate {
   TermSet set;
   Pose<double> f;  ///< Fb in the measurement frame
   Pose<double> e;  ///< measured frame in Ftool
 };
 
-/// Which numbers a fit may move. Frames come first in every matrix, then the parameters.
+/// Unknowns of a fit: free frame parameters first in every matrix, then the parameters.
 struct Unknowns {
-  /// Free numbers of the frames: 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E. Ascending; empty: frames are fixed.
+  /// Free frame parameters: 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E. Ascending; empty: frames are fixed.
   std::vector<std::size_t> frames;
   std::vector<Parameter> parameters;
-  std::vector<PriorKnowledge> prior;  ///< one per parameter; may be shorter: of the others nothing is known
+  std::vector<PriorKnowledge> prior;  ///< one per parameter; may be shorter: the others have none
 
   std::size_t count() const { return frames.size() + parameters.size(); }
   PriorKnowledge prior_of(std::size_t parameter) const {
@@ -37,7 +37,7 @@ struct Unknowns {
   }
 };
 
-/// All numbers of F and E that these rows can see: 12, or 9 where no orientation was measured.
+/// Frame parameters of F and E that these rows can identify: 12, or 9 where no orientation was measured.
 std::vector<std::size_t> free_frames(const std::vector<Observation>& rows);
 
 /// Unwhitened residual of one row: e_p = p - p_model (m), e_R = log(R R_modelᵀ) (rad, zero where not measured), both in
@@ -66,7 +66,7 @@ struct Linearised {
 Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
                       const Unknowns& unknowns);
 
-/// The fixed unit in which a parameter's size is judged, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link
+/// Fixed scale of a parameter, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link
 /// gravity, the usual size of the effect otherwise (docs/model.md, section 7).
 double unit_of(const Parameter& parameter, const TermSet& set);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Errors of many rows in the few numbers that people compare.
+/// Error statistics of many rows, and chi-square.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
 

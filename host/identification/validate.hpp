@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How far a calibrated arm is off on rows that were not fitted.
+/// Validates a calibration on rows that were not fitted.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
 
@@ -17,11 +17,11 @@ struct Validation {
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where there are any, per row
   /// After, over measured_numbers() (nothing is fitted here). Residuals are whitened by the noise of the rows and, where
-  /// the calibration has it, by the uncertainty of what was fitted: 14 poses leave parameters that err by more than the
-  /// noise on other poses without anything being wrong.
+  /// the calibration has it, by the covariance of the estimate: parameters from 14 poses err by more than the
+  /// noise at other poses even where the model is right.
   double chi2 = 0;
   double degrees_of_freedom = 0;
-  std::vector<std::string> doubts;  ///< why the calibration must not be relied on; empty where it may
+  std::vector<std::string> doubts;  ///< why the calibration must not be relied on; empty where it may be
 
   double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
 };
@@ -30,8 +30,8 @@ struct Validation {
 Validation validate(const Robot& robot, const Calibration& calibration, const std::vector<Observation>& rows,
                     const std::string& source);
 
-/// Rows of an arm that was driven with corrected commands while their joints are those that the program wanted: what is
-/// left against the drawing, in the frames of the calibration. Nothing is fitted.
+/// Errors of an arm that was driven with corrected commands, against the nominal model at the joint positions that the
+/// program commanded, in the frames of the calibration. Nothing is fitted.
 ErrorStatistics errors_of_corrected(const Robot& robot, const Calibration& calibration,
                                     const std::vector<Observation>& rows);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How good a set of poses is (Chen et al. 2019, Eq. 30-33), kept up to date by low-rank updates.
+/// Optimality criteria of a set of poses (Chen et al. 2019, Eq. 30-33), with low-rank updates.
 ///
 /// M = HᵀH over the set, H whitened and scaled by fixed units. With L parameters and n poses
 ///   O1 = det(M)^(1/2L) / √n                 (Borm and Menq: geometric mean of the singular values of H, per √pose)
@@ -18,13 +18,13 @@
 
 namespace flexcomp::host {
 
-/// What a search makes small.
+/// Objective that a search minimises.
 enum class Goal {
   dual,       ///< fitness: Omin, expected / O1
-  d_optimal,  ///< 1 / O1 alone, what DETMAX looks at
+  d_optimal,  ///< 1 / O1 alone, the objective of DETMAX
 };
 
-/// The two figures that every criterion is made of, of the parameters (frames projected out).
+/// Trace and determinant from which every criterion is computed, of the parameters (frames projected out).
 struct Figures {
   double trace = 0;    ///< of M⁻¹
   double log_det = 0;  ///< of M
@@ -38,13 +38,13 @@ struct Criterion {
 
   double o1(const Figures& f) const;
   double fitness(const Figures& f) const;    ///< Omin, expected / O1
-  double log_score(const Figures& f) const;  ///< logarithm of what `goal` makes small
+  double log_score(const Figures& f) const;  ///< logarithm of the objective
 };
 
 /// M and its inverse. Rank-r updates; rebuilt from M where rounding would add up.
 class Information {
  public:
-  /// Nothing known but a prior: `prior` on the diagonal (1/σ² in units), so that too few poses have an inverse too.
+  /// Starts from a prior: `prior` on the diagonal (1/σ² in units), so that M is invertible with too few poses too.
   Information(Eigen::Index nuisance, Eigen::Index parameters, double prior);
 
   /// M from scratch (without the prior).

@@ -13,12 +13,12 @@
 namespace flexcomp::host {
 
 /// Excursions from `chosen` until none of them raises det M; returns the logarithm of 1/O1, which never grows.
-/// \param farthest  poses that an excursion may be off the set's size (Mitchell: 6)
+/// \param farthest  largest difference of an excursion from the set's size, poses (Mitchell: 6)
 double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector<std::size_t>& chosen,
               std::mt19937_64& random, std::uint64_t& evaluations, std::size_t farthest = 6);
 
 struct DetmaxOptions {
-  std::size_t candidates = 5000;  ///< where the problem brings none
+  std::size_t candidates = 5000;  ///< where the problem has none
   std::uint64_t restarts = 10;    ///< Mitchell: ten
   std::uint64_t seed = 1;
 };

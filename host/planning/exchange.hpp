@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Exchange among candidates (Fedorov; Cook and Nachtsheim): every pose of the set in turn is taken out and the best
-/// candidate put in its place, until a whole round changes nothing.
+/// candidate put in its place, until a full pass changes nothing.
 #ifndef FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
 #define FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
 
@@ -39,7 +39,7 @@ PoseSet poses_of(const CandidatePool& pool, const std::vector<std::size_t>& chos
 std::vector<Block> blocks_of(const CandidatePool& pool, const std::vector<std::size_t>& chosen);
 
 struct ExchangeOptions {
-  std::size_t candidates = 5000;  ///< where the problem brings none
+  std::size_t candidates = 5000;  ///< where the problem has none
   std::uint64_t restarts = 20;
   Goal goal = Goal::dual;
   std::uint64_t seed = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether a measurement pose can be taken: joint limits, bodies, and the laser tracker's beam (Chen et al. 2019, Section
+/// Feasibility of a measurement pose: joint limits, collisions, and the laser tracker's beam (Chen et al. 2019, Section
 /// 3.2, Eq. 26-29), by exact distances.
 #ifndef FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
 #define FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
@@ -21,7 +21,7 @@
 
 namespace flexcomp::host {
 
-/// What stands against a pose.
+/// Why a pose is not feasible.
 enum class Obstruction {
   none,
   joint_limit,    ///< a reading beyond its limit, or no number
@@ -31,7 +31,7 @@ enum class Obstruction {
   facing_away     ///< the beam comes in at a larger angle than a reflector accepts
 };
 
-/// "beam blocked" and so on, for people.
+/// "beam blocked" and so on, for messages.
 std::string name_of(Obstruction obstruction);
 
 /// Tests single poses of the nominal arm. What is tested against what:
@@ -62,7 +62,7 @@ class Feasibility {
   bool allows(const std::array<double, joint_count>& q_rad) const {
     return check(q_rad) == Obstruction::none;
   }
-  /// One sentence for people with names and figures; empty where the pose is allowed.
+  /// One sentence with names and figures; empty where the pose is feasible.
   std::string why(const std::array<double, joint_count>& q_rad) const;
   /// What is not tested, or less strictly than the files ask. Complete sentences.
   const std::vector<std::string>& warnings() const { return warnings_; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The default method: exchange over a few hundred random poses, then all joint angles at once along the gradient of the
-/// criterion, then one pose after another is replaced and the whole refined again.
+/// The default method: exchange over a few hundred random poses, then projected L-BFGS over all joint positions, then
+/// iterated local search that replaces one pose and refines again.
 #ifndef FLEXCOMP_HOST_PLANNING_REFINE_HPP
 #define FLEXCOMP_HOST_PLANNING_REFINE_HPP
 
@@ -11,8 +11,8 @@
 
 namespace flexcomp::host {
 
-/// Moves all joints of a set downhill (projected limited-memory BFGS); a pose whose step is not allowed takes a shorter
-/// one or stays. Returns the log fitness, which never grows.
+/// Minimises the criterion over all joint positions of a set (projected L-BFGS, Nocedal and Wright, chapter 7); a pose
+/// whose step is not feasible takes a shorter one or stays. Returns the log fitness, which never grows.
 double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double tolerance,
                std::uint64_t& evaluations);
 

@@ -26,12 +26,12 @@ struct SapsoOptions {
   /// Largest step of a joint in one iteration, as a share of its range: c1 = c2 = 2 does not converge by itself.
   double largest_speed = 0.05;
   std::uint64_t seed = 1;
-  /// What is made small; empty: the dual index with Omin in expectation. The oracle form of the paper (Eq. 30, with the
-  /// true parameters) is given by whoever knows them. best_log_fitness() is then the logarithm of this.
+  /// Objective; empty: the dual index with Omin in expectation. The oracle form of the paper (Eq. 30, with the
+  /// true parameters) is given by the studies, which know them. best_log_fitness() is then the logarithm of this.
   std::function<double(const PoseSet&)> objective;
 };
 
-/// Each step is one motion of the swarm.
+/// Each step is one iteration of the swarm.
 class SapsoSearch : public Search {
  public:
   SapsoSearch(const PlanProblem& problem, const SapsoOptions& options) : Search(problem), options_(options) {}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The task of choosing poses, and what every method of doing so has in common: small steps that can be watched,
-/// stopped, written down and gone on with.
+/// The planning problem, and the interface of all search methods: small steps with progress, state that is saved and
+/// restored.
 #ifndef FLEXCOMP_HOST_PLANNING_SEARCH_HPP
 #define FLEXCOMP_HOST_PLANNING_SEARCH_HPP
 
@@ -20,7 +20,7 @@
 
 namespace flexcomp::host {
 
-/// A pose of a plan: where, and with which of the payloads to choose from.
+/// A planned pose: joint positions and index of its payload.
 struct PlannedPose {
   Joints q_rad{};
   std::size_t payload = 0;
@@ -44,7 +44,8 @@ struct PlanProblem {
   std::vector<Block> blocks(const PoseSet& set) const;
   bool allows(const Joints& q_rad) const;  ///< within the limits and feasible
   void take_as_known(std::vector<Block> blocks);
-  /// What is known with these blocks besides; a prior so weak (10,000 units) that it only makes too few poses comparable.
+  /// The information of the measured poses and these blocks; with a weak prior (10,000 units), so that sets of too few
+  /// poses are comparable.
   Information of(const std::vector<Block>& blocks) const;
   double log_fitness(const PoseSet& set) const;
 
@@ -59,7 +60,7 @@ std::size_t below(std::size_t count, std::mt19937_64& random);
 /// Independent random numbers for step `index` of a search with this seed: steps can be repeated one by one.
 std::mt19937_64 random_of(std::uint64_t seed, std::uint64_t index);
 
-/// One method at work on one problem.
+/// A search method applied to one problem.
 class Search {
  public:
   explicit Search(const PlanProblem& problem) : problem_(problem) {}
@@ -67,18 +68,20 @@ class Search {
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
 
-  /// A piece of work; nothing happens where the search is done().
+  /// One step of the search; does nothing where it is done().
   virtual void step() = 0;
   virtual double progress() const = 0;  ///< share of the work that is done, 0 … 1
   bool done() const { return progress() >= 1; }
 
-  const PoseSet& best() const { return best_; }          ///< empty before the first step
-  double best_log_fitness() const { return best_log_; }  ///< of the dual index, whatever the method looks at
+  const PoseSet& best() const { return best_; }  ///< empty before the first step
+  double best_log_fitness() const {
+    return best_log_;
+  }  ///< of the dual index, whatever the method's objective
   std::uint64_t evaluations() const { return evaluations_; }  ///< poses whose H or gain was computed
-  /// Evaluations and log fitness at each improvement, for people.
+  /// Evaluations and log fitness at each improvement.
   const std::vector<std::pair<std::uint64_t, double>>& history() const { return history_; }
 
-  /// All that the rest of the search depends on: a search that loads it goes on as if it had never stopped.
+  /// The complete state: a search that restores it continues exactly as if it had not been interrupted.
   nlohmann::json save() const;
   /// \throws nlohmann::json::exception, std::runtime_error  where the state does not fit
   void load(const nlohmann::json& state);
@@ -88,7 +91,7 @@ class Search {
   virtual void load_own(const nlohmann::json& state) = 0;
   /// Takes a set as the best where it is better.
   bool offer(const PoseSet& set, double log_fitness);
-  /// Takes it in any case: for a method that looks at something else.
+  /// Takes a set as the best in any case: for a method with another objective.
   void replace_best(const PoseSet& set, double log_fitness);
 
   const PlanProblem& problem_;
