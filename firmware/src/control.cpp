@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "flexcomp/bytes.hpp"
+#include "flexcomp/bounds.hpp"
 #include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp {
@@ -73,7 +74,8 @@ void ControlCycle::track(const Joints& q) {
 Scalar ControlCycle::within_limits(std::size_t joint, Scalar q_command, Scalar q) const {
   const Scalar low = q_command < lower_[joint] ? q_command : lower_[joint];
   const Scalar high = q_command > upper_[joint] ? q_command : upper_[joint];
-  return q < low ? low : q > high ? high : q;
+  clamp_to(q, low, high);
+  return q;
 }
 
 void ControlCycle::publish(StepStatus status) {
@@ -106,11 +108,9 @@ void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_r
 void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
   bool changed = false;
   const std::uint32_t index = sets_.handover.take(changed);
-  // 0 * q is 0 but for a NaN or an infinity.
-  Scalar zero = Scalar(0);
-  FLEXCOMP_UNROLL
-  for (std::size_t j = 0; j < joints; ++j) zero += Scalar(0) * q_command_rad[j];
-  if (!(zero <= Scalar(0))) {
+  FiniteCheck<Scalar> command;
+  command.add(q_command_rad);
+  if (!command.passed()) {
     out.q = q_command_rad;
     out.status = StepStatus::refused;
     if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
@@ -156,10 +156,8 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
         const Scalar least = q_command_rad[j] - largest;
         const Scalar most = q_command_rad[j] + largest;
         Scalar q = out.q[j] + fade_offset_[j] * weight;
-        if (q < least || q > most) {
-          q = q < least ? least : most;
-          if (source == Source::set && out.status != StepStatus::at_limit) out.status = StepStatus::limited;
-        }
+        if (clamp_to(q, least, most) && source == Source::set && out.status != StepStatus::at_limit)
+          out.status = StepStatus::limited;
         out.q[j] = within_limits(j, q_command_rad[j], q);
         if (source == Source::set && (out.q[j] < q || out.q[j] > q)) out.status = StepStatus::at_limit;
       }

@@ -57,10 +57,17 @@ Term<double> make_term(Place place, Basis basis, unsigned from_1, Effect effect,
   return t;
 }
 
+/// A link-weight lever (M13) from joint `from_1` to joint `distal_1`, on theta of a link.
+Term<double> make_lever(unsigned link, unsigned from_1, unsigned distal_1, Effect effect) {
+  Term<double> t = make_term(link_place(link, slot::theta), Basis::link_weight, from_1, effect);
+  t.distal_joint = static_cast<std::uint8_t>(distal_1 - 1);
+  return t;
+}
+
 /// Everything of a term but its coefficient, table and instance.
 bool same_kind(const Term<double>& a, const Term<double>& b) {
   return a.place == b.place && a.basis == b.basis && a.joint == b.joint && a.factor == b.factor &&
-         a.effect == b.effect && a.argument == b.argument;
+         a.effect == b.effect && a.argument == b.argument && a.distal_joint == b.distal_joint;
 }
 
 bool has_length(const Nominal& robot, unsigned link) {
@@ -306,11 +313,10 @@ std::vector<EffectKey> keys(const EffectId& id, const Nominal& robot) {
       add("rad_per_nm3", unit::si, {make_term(theta, Basis::load_torque_cubed, id.joint, e)});
       break;
     case Effect::link_gravity:
-      // s_2 is the upper arm's lever: joint 2 with the origin of joint 3 as its far point; s_23 the forearm's: joint 3
-      // with the origin of joint 5. The argument counts joints from 0.
-      add("k1_rad", unit::si, {make_term(link_place(2, slot::theta), Basis::link_weight, 2, e, 2)});
-      add("k2_rad", unit::si, {make_term(link_place(2, slot::theta), Basis::link_weight, 3, e, 4)});
-      add("k3_rad", unit::si, {make_term(link_place(3, slot::theta), Basis::link_weight, 3, e, 4)});
+      // s_2, the upper arm's lever, ends at the origin of joint 3; s_23, the forearm's, at that of joint 5.
+      add("k1_rad", unit::si, {make_lever(2, 2, 3, e)});
+      add("k2_rad", unit::si, {make_lever(2, 3, 5, e)});
+      add("k3_rad", unit::si, {make_lever(3, 3, 5, e)});
       break;
     case Effect::gear_harmonic:
       add("sin_rad", unit::si, {make_term(theta, Basis::sine, id.joint, e, id.order)});

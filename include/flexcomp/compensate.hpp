@@ -25,6 +25,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "flexcomp/bounds.hpp"
 #include "flexcomp/detail/damped_jacobian_solver.hpp"
 #include "flexcomp/detail/joint_deflection.hpp"
 #include "flexcomp/detail/rigid_chain.hpp"
@@ -47,24 +48,18 @@ constexpr S allowed_turn(int correction) {
   return correction == 0 ? S(1) : correction == 1 ? S(0.2) : S(0.02);
 }
 
-/// False for a context with a NaN or an infinity in it: 0 * x is 0 for all other numbers.
+/// False for a context with a NaN or an infinity in it.
 template <class S, std::size_t N>
 inline bool is_finite_context(const Context<S, N>& c) {
-  const S none = S(0);
-  S zero = none * c.payload_kg;
-  zero += none * c.temperature_c;
-  zero += none * c.time_s;
-  FLEXCOMP_UNROLL
-  for (std::size_t k = 0; k < 3; ++k) {
-    zero += none * c.payload_com_m[k];
-    zero += none * c.force_n[k];
-  }
-  FLEXCOMP_UNROLL
-  for (std::size_t i = 0; i < N; ++i) {
-    zero += none * c.direction[i];
-    zero += none * c.relative_speed[i];
-  }
-  return zero <= S(0);
+  FiniteCheck<S> check;
+  check.add(c.payload_kg);
+  check.add(c.temperature_c);
+  check.add(c.time_s);
+  check.add(c.payload_com_m);
+  check.add(c.force_n);
+  check.add(c.direction);
+  check.add(c.relative_speed);
+  return check.passed();
 }
 
 /// Where the flange and the tool point of the chain with constant terms are to be, in F0: the nominal pose
@@ -377,22 +372,14 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   if (square > largest * largest) {
     std::array<S, N> change;
     for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
-    const S greatest = detail::greatest_of(change);
-    if (greatest > largest) {
+    if (scale_to_limit(change, largest)) {
       out.status = StepStatus::limited;
-      const S scale = largest / greatest;
-      for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i] + change[i] * scale;
+      for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i] + change[i];
     }
   }
   for (std::size_t i = 0; i < N; ++i) {
     S x = q[i];
-    if (x < model.lower(i)) {
-      x = model.lower(i);
-      out.status = StepStatus::at_limit;
-    } else if (x > model.upper(i)) {
-      x = model.upper(i);
-      out.status = StepStatus::at_limit;
-    }
+    if (clamp_to(x, model.lower(i), model.upper(i))) out.status = StepStatus::at_limit;
     out.q[i] = x;
   }
 }

@@ -336,11 +336,8 @@ inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const C
       const S tau = torque();
       return tau * tau * tau;
     }
-    case Basis::link_weight: {
-      std::size_t far = N - 1;
-      while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
-      return detail::link_weight_lever<S, N>(ws.frames, model.gravity(), j, far);
-    }
+    case Basis::link_weight:
+      return detail::link_weight_lever<S, N>(ws.frames, model.gravity(), j, term.distal_joint);
     case Basis::load_moment_x:
       return detail::moment_about<S>(ws.load, ws.frames.axis(j + 1, 0), ws.frames.origin[j + 1]);
     case Basis::load_moment_y:

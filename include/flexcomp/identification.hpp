@@ -179,14 +179,14 @@ struct LoadResponse {
 namespace detail {
 
 /// d value of a basis that needs the load: per change of the load, and per twist of everything behind a link,
-/// which is one vector where only the far point of a lever moves and another where the whole basis moves.
+/// which is one vector where only the distal point of a lever moves and another where the whole basis moves.
 template <class S>
 struct BasisResponse {
   Vector6<S> load = Vector6<S>::Zero();   ///< per [force; moment]
   Vector6<S> whole = Vector6<S>::Zero();  ///< per [linear; angular], while frame `frame` moves too
-  Vector6<S> part = Vector6<S>::Zero();   ///< the same while only frames up to `far` move, beyond `frame`
+  Vector6<S> part = Vector6<S>::Zero();   ///< the same while only frames up to `distal` move, beyond `frame`
   std::size_t frame = 0;
-  std::size_t far = 0;
+  std::size_t distal = 0;
 };
 
 /// Of a moment of the load about a direction that is fixed in a frame, through that frame's origin.
@@ -208,7 +208,7 @@ inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term
   const std::size_t j = term.joint;
   const Frames<S, N>& f = ws.frames;
   const auto about = [&](std::size_t frame, int axis, const S& factor) {
-    r.frame = r.far = frame;
+    r.frame = r.distal = frame;
     respond_about<S>(ws.load, f.axis(frame, axis), f.origin[frame], factor, r);
   };
   switch (term.basis) {
@@ -234,10 +234,9 @@ inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term
       break;  // frame 0 never moves
     }
     case Basis::link_weight: {
-      std::size_t far = N - 1;
-      while (far > j + 1 && S(static_cast<float>(far)) > term.argument) --far;
+      const std::size_t distal = term.distal_joint;
       const Vector3<S> z = f.axis(j, 2);
-      const Vector3<S> arm = f.origin[far] - f.origin[j];
+      const Vector3<S> arm = f.origin[distal] - f.origin[j];
       const S along = dot<S>(z, arm);
       const S square = dot<S>(arm, arm) - along * along;
       const S g2 = dot<S>(model.gravity(), model.gravity());
@@ -247,8 +246,8 @@ inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term
       const Vector3<S> pull = cross<S>(model.gravity(), z);
       const Vector3<S> stretch = (pull - (arm - z * along) * (dot<S>(arm, pull) / square)) * scale;
       r.frame = j;
-      r.far = far;
-      r.part << stretch, cross<S>(f.origin[far], stretch);
+      r.distal = distal;
+      r.part << stretch, cross<S>(f.origin[distal], stretch);
       // Turning the lever is turning gravity the other way.
       r.whole.template tail<3>() = cross<S>(model.gravity(), cross<S>(z, arm)) * -scale;
       break;
@@ -299,7 +298,7 @@ inline void load_response(const Model<S, N, Cap>& model, const Linearisation<S, 
     out.to_load.noalias() += moved * r.load.transpose();
     // Frame f moves with the links 0 … f - 1.
     for (std::size_t i = 0; i < r.frame; ++i) out.to_twist[i].noalias() += moved * r.whole.transpose();
-    for (std::size_t i = r.frame; i < r.far; ++i) out.to_twist[i].noalias() += moved * r.part.transpose();
+    for (std::size_t i = r.frame; i < r.distal; ++i) out.to_twist[i].noalias() += moved * r.part.transpose();
   }
 }
 

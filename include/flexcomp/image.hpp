@@ -126,7 +126,7 @@ inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& head
     store_u16(p + 10, t.instance);
     store_u16(p + 12, t.table);
     store_u16(p + 14, 0);
-    store_u64(p + 16, to_binary64_bits(t.argument));
+    store_u64(p + 16, to_binary64_bits(t.basis == Basis::link_weight ? S(t.distal_joint) : t.argument));
     store_u64(p + 24, to_binary64_bits(t.coefficient));
     p += image::record_head_bytes + image::term_bytes;
   }
@@ -168,6 +168,18 @@ inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sh
   return Refusal::none;
 }
 
+namespace detail {
+
+/// The distal joint (from 0) that a term's argument names; 0 where it names none.
+template <class S>
+inline std::uint8_t distal_joint_of(S argument) {
+  std::uint8_t joint = 0xFF;
+  while (joint != 0 && !(S(joint) == argument)) --joint;
+  return joint;
+}
+
+}  // namespace detail
+
 /// Hands each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t*
 /// values)` and `Refusal term(const Term<S>&)`. Stops at the first refusal. Bounded by the size of the image.
 template <class S, class Visitor>
@@ -200,6 +212,10 @@ inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&
       t.argument = load_scalar<S>(body + 12);
       t.coefficient = load_scalar<S>(body + 20);
       if (!is_finite(t.argument) || !is_finite(t.coefficient)) return Refusal::bad_value;
+      if (t.basis == Basis::link_weight) {
+        t.distal_joint = detail::distal_joint_of(t.argument);
+        t.argument = S(0);
+      }
       ++terms;
       r = visitor.term(t);
     } else if (type == image::record_table) {

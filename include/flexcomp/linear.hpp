@@ -18,7 +18,7 @@ extern "C" [[noreturn]] void FLEXCOMP_FAULT();
 #endif
 #include <Eigen/Core>
 
-#include "flexcomp/compiler.hpp"
+#include "flexcomp/detail/compiler.hpp"
 
 namespace flexcomp {
 

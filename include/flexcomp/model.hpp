@@ -166,18 +166,13 @@ class Model {
     if (static_cast<std::uint8_t>(term.factor) > static_cast<std::uint8_t>(Factor::payload))
       return Refusal::bad_value;
     if (term.joint >= N) return Refusal::bad_value;
-    std::uint16_t far_joint = no_table;
     // The load is edited before torques are taken, so its edit cannot depend on the pose.
     if (p.body == body::load && term.basis != Basis::one) return Refusal::bad_place;
     if (term.basis == Basis::thermal && !(link && (p.slot == slot::a || p.slot == slot::d)))
       return Refusal::bad_place;
     if (term.basis == Basis::link_weight) {
       if (!axial_gravity_) return Refusal::mounting;
-      // The far point is the origin of a joint farther out, by number.
-      std::size_t far = term.joint + std::size_t{1};
-      while (far < N && !(term.argument == S(static_cast<float>(far)))) ++far;
-      if (far >= N) return Refusal::bad_value;
-      far_joint = static_cast<std::uint16_t>(far);
+      if (term.distal_joint <= term.joint || term.distal_joint >= N) return Refusal::bad_value;
     }
     if (term.basis == Basis::curve || term.basis == Basis::grid) {
       if (term.table >= table_count_) return Refusal::bad_value;
@@ -198,8 +193,6 @@ class Model {
     }
     if (effect_count_ >= Cap::terms) return Refusal::too_many_terms;
     effects_[effect_count_++] = term;
-    // A lever has no table; there its far joint stands as a number.
-    if (term.basis == Basis::link_weight) effects_[effect_count_ - 1].table = far_joint;
     if (reads_direction(term)) reads_direction_ = true;
     if (flexcomp::needs_loads(term.basis, term.factor)) needs_loads_ = true;
     if (p.body == body::base) {
@@ -285,7 +278,7 @@ class Model {
   /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
   S compliance(std::size_t i) const { return compliance_[i]; }
   std::size_t lever_count() const { return group_end_[lever]; }
-  /// Equal levers side by side; `table` is the far joint as a number.
+  /// Link-weight terms, equal levers side by side.
   const Term<S>& lever_term(std::size_t k) const { return effects_[order_[k]]; }
   std::size_t other_loaded_count() const { return group_end_[other_loaded] - group_end_[lever]; }
   const Term<S>& other_loaded_term(std::size_t k) const { return effects_[order_[group_end_[lever] + k]]; }
@@ -440,7 +433,7 @@ class Model {
   }
 
   static bool comes_before(const Term<S>& a, const Term<S>& b) {
-    return a.joint != b.joint ? a.joint < b.joint : a.argument < b.argument;
+    return a.joint != b.joint ? a.joint < b.joint : a.distal_joint < b.distal_joint;
   }
 
   static bool is_zero(double v) { return bits_of(v) << 1U == 0; }

@@ -56,7 +56,7 @@ enum class Basis : std::uint8_t {
   one = 0,                ///< 1: a geometric error
   load_torque = 1,        ///< tau_joint, N·m: torque of payload and external force about the joint's axis
   load_torque_cubed = 2,  ///< tau_joint^3
-  link_weight = 3,     ///< lever s of the link of `joint` (docs/model.md, M13); `argument` = joint of the far point
+  link_weight = 3,     ///< lever s of the link of `joint` with `distal_joint` (docs/model.md, M13), 1
   joint_position = 4,  ///< q_joint, rad
   sine = 5,            ///< sin(argument * q_joint)
   cosine = 6,          ///< cos(argument * q_joint)
@@ -127,7 +127,8 @@ struct Term {
   Effect effect = Effect::geometric;  ///< the name it goes by
   std::uint16_t instance = 0;         ///< terms of one effect with the same number enter and leave together
   std::uint16_t table = no_table;     ///< index into the tables
-  S argument = S(0);                  ///< order, pivot height (m), time (s) or far joint, by basis
+  std::uint8_t distal_joint = 0;      ///< of a link-weight lever: the joint (from 0) at its distal end; 0: none
+  S argument = S(0);                  ///< order, pivot height (m) or time (s), by basis
   S coefficient = S(1);
 };
 

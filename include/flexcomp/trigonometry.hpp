@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "flexcomp/compiler.hpp"
+#include "flexcomp/detail/compiler.hpp"
 
 namespace flexcomp {
 

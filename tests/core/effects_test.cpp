@@ -71,9 +71,9 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
   for (const auto& x : t.joint_compliance)
     set.add(place(x.joint, slot::theta), Basis::load_torque, x.rad_per_nm, index(x.joint));
   for (const auto& x : t.link_gravity) {
-    set.add(place(2, slot::theta), Basis::link_weight, x.k1, 1, 2.0);
-    set.add(place(2, slot::theta), Basis::link_weight, x.k2, 2, 4.0);
-    set.add(place(3, slot::theta), Basis::link_weight, x.k3, 2, 4.0);
+    set.add_lever(place(2, slot::theta), x.k1, 1, 2);
+    set.add_lever(place(2, slot::theta), x.k2, 2, 4);
+    set.add_lever(place(3, slot::theta), x.k3, 2, 4);
   }
   for (const auto& x : t.nonlinear_compliance)
     set.add(place(x.joint, slot::theta), Basis::load_torque_cubed, x.rad_per_nm3, index(x.joint));
@@ -322,7 +322,7 @@ TEST(Effects, LinkGravityIsRefusedAwayFromTheAxisOfJoint1) {
   t.place = on_link(2, slot::theta);
   t.basis = Basis::link_weight;
   t.joint = 1;
-  t.argument = 2;
+  t.distal_joint = 2;
   for (const std::array<double, 3>& g : {std::array<double, 3>{9.81, 0, 0}, {0, -1e-9, -9.81}}) {
     arms::Robot robot = arms::tx60l();
     robot.gravity_m_s2 = g;
@@ -338,9 +338,9 @@ TEST(Effects, LinkGravityIsRefusedAwayFromTheAxisOfJoint1) {
 }
 
 /// Value of a lever on a robot without errors.
-double lever(const arms::Robot& robot, const Joints& q, std::size_t joint, double far) {
+double lever(const arms::Robot& robot, const Joints& q, std::size_t joint, std::size_t distal) {
   arms::TermSet<double> set;
-  set.add(on_link(joint + 1, slot::theta), Basis::link_weight, 1.0, joint, far);
+  set.add_lever(on_link(joint + 1, slot::theta), 1.0, joint, distal);
   Model<double> model;
   EXPECT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
   flexcomp::Linearisation<double> at;
@@ -354,8 +354,8 @@ TEST(Effects, LeversOfTheTx60lAreTheSinesOfThePaper) {
   arms::Random random(64);
   for (int n = 0; n < 1000; ++n) {
     const Joints q = random.pose(robot);
-    ASSERT_NEAR(lever(robot, q, 1, 2.0), std::sin(q[1]), 1e-14);
-    ASSERT_NEAR(lever(robot, q, 2, 4.0), std::sin(q[1] + q[2]), 1e-14);
+    ASSERT_NEAR(lever(robot, q, 1, 2), std::sin(q[1]), 1e-14);
+    ASSERT_NEAR(lever(robot, q, 2, 4), std::sin(q[1] + q[2]), 1e-14);
   }
 }
 
@@ -363,7 +363,7 @@ TEST(Effects, ALeverShorterThanAMillimetreIsZero) {
   // Joint 5 of the TX60L lies on axis 4: no length across it.
   arms::Random random(65);
   const arms::Robot robot = arms::tx60l();
-  for (int n = 0; n < 100; ++n) EXPECT_EQ(lever(robot, random.pose(robot), 3, 4.0), 0);
+  for (int n = 0; n < 100; ++n) EXPECT_EQ(lever(robot, random.pose(robot), 3, 4), 0);
 }
 
 TEST(Effects, PositiveCoefficientsSag) {
@@ -377,9 +377,9 @@ TEST(Effects, PositiveCoefficientsSag) {
         Joints q{0.4, upright ? side * 1.2 : (side > 0 ? -0.3 : -2.8), 0.2 * side, 0.3, 0.5, 0.1};
         for (int which = 0; which < 6; ++which) {
           arms::TermSet<double> set;
-          if (which == 0) set.add(on_link(2, slot::theta), Basis::link_weight, 1e-3, 1, 2.0);
-          if (which == 1) set.add(on_link(2, slot::theta), Basis::link_weight, 1e-3, 2, 4.0);
-          if (which == 2) set.add(on_link(3, slot::theta), Basis::link_weight, 1e-3, 2, 4.0);
+          if (which == 0) set.add_lever(on_link(2, slot::theta), 1e-3, 1, 2);
+          if (which == 1) set.add_lever(on_link(2, slot::theta), 1e-3, 2, 4);
+          if (which == 2) set.add_lever(on_link(3, slot::theta), 1e-3, 2, 4);
           if (which == 3) set.add(on_link(2, slot::theta), Basis::load_torque, 1e-5, 1);
           if (which == 4) set.add(on_link(3, slot::theta), Basis::load_torque, 1e-5, 2);
           if (which == 5) set.add(on_link(2, slot::theta), Basis::load_torque_cubed, 1e-7, 1);
@@ -638,10 +638,11 @@ TEST(Effects, WhatAModelRefuses) {
             Refusal::unknown_basis);
   EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::load_torque, 6), Refusal::bad_value);
   EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::load_torque, 255), Refusal::bad_value);
-  EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::link_weight, 2, 2.0), Refusal::bad_value);
-  EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::link_weight, 2, 6.0), Refusal::bad_value);
-  EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::link_weight, 5, 5.5), Refusal::bad_value);
-  EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::link_weight, 1, std::nan("")), Refusal::bad_value);
+  for (const auto& [joint, distal] : {std::pair<std::size_t, std::size_t>{2, 2}, {2, 6}, {5, 0}}) {
+    arms::TermSet<double> set;
+    set.add_lever(on_link(1, slot::theta), 1.0, joint, distal);
+    EXPECT_EQ(Model<double>().prepare(robot, set.list()), Refusal::bad_value);
+  }
   EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::curve, 1), Refusal::bad_value);
   EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::grid, 1, 0, 0), Refusal::bad_value);
 }

@@ -119,7 +119,11 @@ TermSet<double> any_list(arms::Random& random) {
     t.effect = static_cast<flexcomp::Effect>(random.below(256));
     t.instance = static_cast<std::uint16_t>(random.bits());
     t.table = static_cast<std::uint16_t>(random.bits());
-    t.argument = any_finite(random);
+    if (t.basis == Basis::link_weight) {
+      t.distal_joint = static_cast<std::uint8_t>(random.bits());
+    } else {
+      t.argument = any_finite(random);
+    }
     t.coefficient = any_finite(random);
     set.terms.push_back(t);
   }
@@ -327,6 +331,18 @@ TEST(Image, RecordsAreChecked) {
   const auto single = std::make_unique<Model<float>>();
   EXPECT_EQ(load(one_term(huge, robot), robot, *single), Refusal::bad_value);
   EXPECT_EQ(load(one_term(huge, robot), robot), Refusal::none);
+
+  // The distal joint of a lever stands in the image as a number: one that is none is refused.
+  Term<double> lever = t;
+  lever.basis = Basis::link_weight;
+  lever.distal_joint = 2;
+  Bytes bytes = one_term(lever, robot);
+  EXPECT_EQ(load(bytes, robot), Refusal::none);
+  for (const double argument : {1.0, 2.5, 6.0, -1.0, 258.0}) {
+    flexcomp::store_u64(bytes.data() + flexcomp::image::header_bytes + 16, flexcomp::bits_of(argument));
+    fix_crc(bytes);
+    EXPECT_EQ(load(bytes, robot), Refusal::bad_value) << argument;
+  }
 
   // What belongs to the measurement is never pushed.
   for (const flexcomp::Effect e :

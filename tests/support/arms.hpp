@@ -135,6 +135,13 @@ struct TermSet {
     return terms.back();
   }
 
+  /// A link-weight lever (M13) from joint to distal joint, both from 0.
+  flexcomp::Term<S>& add_lever(flexcomp::Place place, S coefficient, std::size_t joint, std::size_t distal) {
+    flexcomp::Term<S>& t = add(place, flexcomp::Basis::link_weight, coefficient, joint);
+    t.distal_joint = static_cast<std::uint8_t>(distal);
+    return t;
+  }
+
   /// Curve over a turn; returns the index of its table.
   std::uint16_t add_curve(const std::vector<double>& coefficients) {
     flexcomp::Table t;
@@ -173,6 +180,7 @@ inline TermSet<To> as(const TermSet<double>& from) {
     u.effect = t.effect;
     u.instance = t.instance;
     u.table = t.table;
+    u.distal_joint = t.distal_joint;
     u.argument = To(t.argument);
     u.coefficient = To(t.coefficient);
     r.terms.push_back(u);
@@ -225,9 +233,9 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
     t.effect = Effect::joint_compliance;
     t.instance = static_cast<std::uint16_t>(i);
   }
-  set.add(on_link(2, slot::theta), Basis::link_weight, scale * 0.0015, 1, 2.0).effect = Effect::link_gravity;
-  set.add(on_link(2, slot::theta), Basis::link_weight, scale * 0.00123, 2, 4.0).effect = Effect::link_gravity;
-  set.add(on_link(3, slot::theta), Basis::link_weight, scale * 0.00054, 2, 4.0).effect = Effect::link_gravity;
+  set.add_lever(on_link(2, slot::theta), scale * 0.0015, 1, 2).effect = Effect::link_gravity;
+  set.add_lever(on_link(2, slot::theta), scale * 0.00123, 2, 4).effect = Effect::link_gravity;
+  set.add_lever(on_link(3, slot::theta), scale * 0.00054, 2, 4).effect = Effect::link_gravity;
   return set;
 }
 

@@ -117,11 +117,11 @@ inline std::vector<flexcomp::Term<double>> all_bases(flexcomp::Place place, Rand
   if (place.body == flexcomp::body::load) return list;
   for (int joint = 0; joint < 6; ++joint) push(Basis::load_torque, 0, joint);
   push(Basis::load_torque_cubed);
-  for (int joint = 0; joint < 5; ++joint)
-    push(Basis::link_weight,
-         static_cast<double>(joint + 1) +
-             static_cast<double>(random.below(static_cast<std::size_t>(5 - joint))),
-         joint);
+  for (int joint = 0; joint < 5; ++joint) {
+    const std::size_t beyond = random.below(static_cast<std::size_t>(5 - joint));
+    push(Basis::link_weight, 0, joint);
+    list.back().distal_joint = static_cast<std::uint8_t>(static_cast<std::size_t>(joint) + 1 + beyond);
+  }
   push(Basis::joint_position);
   push(Basis::sine, 2);
   push(Basis::cosine, 100);

@@ -111,7 +111,11 @@ inline flexcomp::Term<S> make_term(const Entry& e) {
   term.place = {e.body, e.slot};
   term.basis = e.basis;
   term.joint = e.joint;
-  term.argument = flexcomp::from_binary64<S>(e.argument);
+  if (e.basis == Basis::link_weight) {
+    term.distal_joint = static_cast<std::uint8_t>(flexcomp::from_binary64<S>(e.argument));
+  } else {
+    term.argument = flexcomp::from_binary64<S>(e.argument);
+  }
   term.coefficient = flexcomp::from_binary64<S>(e.coefficient);
   term.effect = e.basis == Basis::load_torque   ? Effect::joint_compliance
                 : e.basis == Basis::link_weight ? Effect::link_gravity

@@ -19,6 +19,7 @@
 #include <array>
 #include <cstddef>
 
+#include "flexcomp/bounds.hpp"
 #include "flexcomp/detail/rigid_chain.hpp"
 #include "flexcomp/linear.hpp"
 
@@ -77,25 +78,6 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
   d.zz += lambda;
   const Symmetric<S> e = d.adjugate();
   inverse = e.over(d.xx * e.xx + d.xy * e.xy + d.xz * e.xz);
-}
-
-/// Largest magnitude in a list; NaNs are skipped.
-template <class S, std::size_t N>
-FLEXCOMP_ONCE S greatest_of(const std::array<S, N>& v) {
-  S greatest = S(0);
-  for (const S x : v) {
-    if (x > greatest) greatest = x;
-    if (-x > greatest) greatest = -x;
-  }
-  return greatest;
-}
-
-template <class S, std::size_t N>
-inline S square_of(const std::array<S, N>& v) {
-  S sum = S(0);
-  FLEXCOMP_UNROLL
-  for (std::size_t i = 0; i < N; ++i) sum += v[i] * v[i];
-  return sum;
 }
 
 /// The factored Jacobian of one pose; every correction of a cycle uses it.
@@ -253,13 +235,6 @@ class DampedJacobianSolver {
     if (scale_to_limit(turn, largest_turn)) gave_up_ = true;
     for (std::size_t i = 0; i < N; ++i) dq[i] += turn[i];
     return square_of(dq);
-  }
-  FLEXCOMP_ONCE static bool scale_to_limit(std::array<S, N>& v, S largest) {
-    const S greatest = greatest_of(v);
-    if (!(greatest > largest)) return false;
-    const S scale = largest / greatest;
-    for (S& x : v) x *= scale;
-    return true;
   }
 
   std::array<JointAxis<S>, N> column_;  ///< axis, and in the place of the origin axis x (tool - origin)

@@ -215,10 +215,10 @@ inline void add_levers(const Model<S, N, Cap>& model, const Lever& lever, std::a
   for (std::size_t k = 0; k < count; ++k) {
     const Term<S>& term = model.lever_term(k);
     // Equal levers stand side by side.
-    const std::uint32_t this_one = (std::uint32_t{term.joint} << 16U) | term.table;
+    const std::uint32_t this_one = (std::uint32_t{term.joint} << 16U) | term.distal_joint;
     if (this_one != which) {
       which = this_one;
-      value = lever(term.joint, term.table);
+      value = lever(term.joint, term.distal_joint);
     }
     delta[term.place.body - 1U] += term.coefficient * value;
   }

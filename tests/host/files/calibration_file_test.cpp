@@ -83,7 +83,8 @@ void expect_identical(const TermSet& a, const TermSet& b) {
     const Term<double>& x = a.terms[k];
     const Term<double>& y = b.terms[k];
     EXPECT_TRUE(x.place == y.place && x.basis == y.basis && x.joint == y.joint && x.factor == y.factor &&
-                x.effect == y.effect && x.instance == y.instance && x.table == y.table)
+                x.effect == y.effect && x.instance == y.instance && x.table == y.table &&
+                x.distal_joint == y.distal_joint)
         << k;
     EXPECT_TRUE(same_bits(x.argument, y.argument)) << k;
     EXPECT_TRUE(same_bits(x.coefficient, y.coefficient)) << k << " " << x.coefficient << " " << y.coefficient;

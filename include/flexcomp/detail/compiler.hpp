@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the core asks of the compiler beyond the language. Both are only about speed and size.
-#ifndef FLEXCOMP_COMPILER_HPP
-#define FLEXCOMP_COMPILER_HPP
+#ifndef FLEXCOMP_DETAIL_COMPILER_HPP
+#define FLEXCOMP_DETAIL_COMPILER_HPP
 
 /// Before a short loop over the joints: on a small controller counting would cost as much as what is counted.
 #if defined(__clang__)
