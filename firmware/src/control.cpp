@@ -3,8 +3,8 @@
 
 #include <cstring>
 
-#include "flexcomp/bytes.hpp"
 #include "flexcomp/bounds.hpp"
+#include "flexcomp/bytes.hpp"
 #include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp {

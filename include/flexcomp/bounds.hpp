@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What bounds a corrected command: finiteness, the largest correction, the joint limits (docs/compensation.md, C10,
+/// Settings and bounds of a corrected command: finiteness, largest correction, joint limits (docs/compensation.md, C10,
 /// C17, C20). The core and the control cycle share them.
 #ifndef FLEXCOMP_BOUNDS_HPP
 #define FLEXCOMP_BOUNDS_HPP
@@ -12,16 +12,30 @@
 
 namespace flexcomp {
 
-/// Sum of 0·x over the numbers given: 0 where all of them are finite, NaN otherwise. Two operations a number.
+/// Settings of the compensation (docs/compensation.md, section 1). The defaults suit arms of 0.3 to 4 m with errors below
+/// 20 mm.
+template <class S>
+struct CompensationSettings {
+  S largest_correction_rad = S(0.1);  ///< of any joint; a larger correction is scaled as a whole (C10, C17)
+  /// Threshold of kappa^(1/2) below which damping sets in (C9): m/rad for position, 1 for orientation. An arm whose
+  /// Jacobian has a smallest singular value of 0.1 (lengths in m) is never below 0.1/sqrt(3).
+  S singular_below = S(0.05);
+  S damping = S(0.1);  ///< at the singularity itself (C9)
+};
+
+/// Sum of 0·x over numbers: 0 where all are finite, else NaN. Two operations per number, no branch.
 template <class S>
 class FiniteCheck {
  public:
+  /// Takes one number into account.
   void add(const S& x) { sum_ += S(0) * x; }
+  /// Takes every number of a list into account.
   template <std::size_t N>
   void add(const std::array<S, N>& v) {
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) add(v[i]);
   }
+  /// True where all numbers so far are finite.
   bool passed() const { return sum_ <= S(0); }
 
  private:

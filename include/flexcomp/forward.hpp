@@ -11,8 +11,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 
+#include "flexcomp/detail/basis.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/model.hpp"
 #include "flexcomp/robot.hpp"
@@ -140,7 +140,7 @@ inline void loaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
 /// Payload weight and external force in the frames of ws (Eq. 10-13; the force Jacobian's detour equals
 /// this).
 template <class S, std::size_t N, class Cap>
-inline void take_load(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
+inline void compute_load(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
   const std::array<S, 4>& edit = model.load_edit();
   const Vector3<S> com(context.payload_com_m[0] + edit[slot::com_x],
                        context.payload_com_m[1] + edit[slot::com_y],
@@ -163,159 +163,19 @@ inline S moment_about(const Load<S>& load, const Vector3<S>& direction, const Ve
   return dot<S>(direction, load.moment - cross<S>(point, load.force));
 }
 
-/// Lever of the link's own weight (docs/model.md, M13): z · ((far - p) × g_hat) / ‖part of (far - p) perpendicular to
+/// Lever of the link's own weight (docs/model.md, M13): z · ((distal - p) × g_hat) / ‖part of (distal - p) perpendicular to
 /// z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is under 1 mm.
 template <class S, std::size_t N>
 inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity, std::size_t joint,
-                           std::size_t far) {
+                           std::size_t distal) {
   const Vector3<S> z = frames.axis(joint, 2);
-  const Vector3<S> arm = frames.origin[far] - frames.origin[joint];
+  const Vector3<S> arm = frames.origin[distal] - frames.origin[joint];
   const Vector3<S> across = arm - z * dot<S>(z, arm);
   const S square = dot<S>(across, across);
   const S g2 = dot<S>(gravity, gravity);
   if (!(square > S(1e-6)) || !(g2 > S(0))) return S(0);
   using std::sqrt;  // dual numbers bring their own
   return dot<S>(z, cross<S>(arm, gravity)) / sqrt(square * g2);
-}
-
-/// Integer part towards zero; overloaded for dual numbers beside their type.
-inline std::int32_t truncate(double v) { return static_cast<std::int32_t>(v); }
-inline std::int32_t truncate(float v) { return static_cast<std::int32_t>(v); }
-template <class T>
-inline std::int32_t truncate(const T& v) {
-  return static_cast<std::int32_t>(v.a);
-}
-
-/// The four weights of a uniform periodic cubic B-spline and the index of the first coefficient.
-template <class S>
-struct CurveWeights {
-  std::array<S, 4> w;
-  std::array<std::uint16_t, 4> index;
-};
-
-/// δ(q) = Σ c_k B(M q / 2π - k), B the cardinal cubic B-spline centred at 0 (de Boor), period M.
-template <class S>
-inline CurveWeights<S> curve_weights(const S& q, std::uint16_t m) {
-  const S t = q * S(static_cast<float>(m)) * S(0.15915494309189533577);
-  std::int32_t k = 0;
-  // Readings lie within ±1e5 rad and M <= 256: far inside 32 bits. Written so that a NaN gives k = 0.
-  if (t > S(-1e7F) && t < S(1e7F)) k = truncate(t);
-  S u = t - S(static_cast<float>(k));
-  if (u < S(0)) {
-    u += S(1);
-    --k;
-  }
-  CurveWeights<S> r;
-  const S v = S(1) - u;
-  r.w[0] = v * v * v * S(1.0 / 6);
-  r.w[1] = S(2.0 / 3) - u * u * (S(1) - u * S(0.5));
-  r.w[2] = S(2.0 / 3) - v * v * (S(1) - v * S(0.5));
-  r.w[3] = u * u * u * S(1.0 / 6);
-  std::int32_t first = (k - 1) % static_cast<std::int32_t>(m);
-  if (first < 0) first += m;
-  for (std::size_t i = 0; i < 4; ++i) {
-    r.index[i] = static_cast<std::uint16_t>(first);
-    if (++first == m) first = 0;
-  }
-  return r;
-}
-
-template <class S, std::size_t N>
-FLEXCOMP_ONCE S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
-                          const Context<S, N>& context) {
-  switch (kind) {
-    case Covariate::joint_position:
-      return q[joint];
-    case Covariate::payload:
-      return context.payload_kg;
-    case Covariate::temperature:
-      return context.temperature_c;
-    case Covariate::time:
-      return context.time_s;
-    case Covariate::direction:
-      return context.direction[joint];
-    case Covariate::relative_speed:
-      return context.relative_speed[joint];
-  }
-  return S(0);
-}
-
-/// The cell and the position in it (0 … 1) of x among ascending nodes; the ends hold outside.
-template <class S>
-struct Cell {
-  std::size_t index;
-  S fraction;
-};
-
-template <class S>
-FLEXCOMP_ONCE Cell<S> find_cell(const S* nodes, std::size_t count, const S& x) {
-  if (!(x > nodes[0])) return {0, S(0)};
-  std::size_t k = 0;
-  while (k + 2 < count && x >= nodes[k + 1]) ++k;  // at most 64 nodes
-  if (x >= nodes[k + 1]) return {k, S(1)};
-  return {k, (x - nodes[k]) / (nodes[k + 1] - nodes[k])};
-}
-
-template <class S>
-inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cell<S>& column) {
-  const S* top = v + row.index * columns + column.index;
-  const S* bottom = top + columns;
-  const S upper = top[0] + (top[1] - top[0]) * column.fraction;
-  const S lower = bottom[0] + (bottom[1] - bottom[0]) * column.fraction;
-  return upper + (lower - upper) * row.fraction;
-}
-
-/// basis_value() of the bases that need neither frames nor loads, at the readings q (rad). A curve's factor of torque is
-/// left to the caller.
-template <class S, std::size_t N, class Cap>
-inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
-                           const std::array<S, N>& q) {
-  const std::size_t j = term.joint;
-  switch (term.basis) {
-    case Basis::one:
-      return S(1);
-    case Basis::joint_position:
-      return q[j];
-    case Basis::sine:
-      return sin_cos(term.argument * q[j]).s;
-    case Basis::cosine:
-      return sin_cos(term.argument * q[j]).c;
-    case Basis::direction:
-      return -context.direction[j];
-    case Basis::relative_speed:
-      return context.relative_speed[j];
-    case Basis::thermal: {
-      const LinkShape<S>& link = model.nominal(term.place.body - 1U);
-      return (context.temperature_c - model.reference_temperature()) *
-             (term.place.slot == slot::a ? link.a : link.d);
-    }
-    case Basis::time:
-      return context.time_s;
-    case Basis::curve: {
-      const Table& table = model.table(term.table);
-      const S* c = model.values(table);
-      const CurveWeights<S> b = curve_weights(q[j], table.size);
-      const S value =
-          c[b.index[0]] * b.w[0] + c[b.index[1]] * b.w[1] + c[b.index[2]] * b.w[2] + c[b.index[3]] * b.w[3];
-      if (term.factor == Factor::temperature)
-        return value * (context.temperature_c - model.reference_temperature());
-      if (term.factor == Factor::payload) return value * context.payload_kg;
-      return value;
-    }
-    case Basis::step:
-      return context.time_s >= term.argument ? S(1) : S(0);
-    case Basis::grid: {
-      const Table& table = model.table(term.table);
-      const S* nodes = model.values(table);
-      const S row = covariate<S, N>(table.row_covariate, table.row_joint, q, context);
-      const S column = covariate<S, N>(table.column_covariate, table.column_joint, q, context);
-      return bilinear<S>(nodes + table.rows + table.columns, table.columns,
-                         find_cell<S>(nodes, table.rows, row),
-                         find_cell<S>(nodes + table.rows, table.columns, column));
-    }
-    default:
-      return S(0);
-  }
 }
 
 }  // namespace detail
@@ -361,7 +221,7 @@ inline Pose<S> evaluate(const Model<S, N, Cap>& model, const Context<S, N>& cont
   for (std::size_t i = 0; i < N; ++i) ws.angle[i] = compose(ws.reading[i], model.shape(i).offset);
   if (model.needs_loads()) {
     unloaded_pass(model, ws);
-    take_load(model, context, ws);
+    compute_load(model, context, ws);
   }
   ws.slots.clear();
   for (std::size_t k = 0; k < model.effect_count(); ++k) {

@@ -97,7 +97,7 @@ inline void linearise(const Model<S, N, Cap>& model, const std::array<S, N>& q_r
     u.angle[i] = compose(u.reading[i], model.shape(i).offset);
   }
   detail::unloaded_pass(model, u);
-  detail::take_load(model, context, u);
+  detail::compute_load(model, context, u);
   out.loaded.q = q_rad;
   out.loaded.reading = u.reading;
   out.pose = detail::evaluate(model, context, out.loaded);

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "flexcomp/detail/effect_group.hpp"
+#include "flexcomp/detail/link_shape.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
 #include "flexcomp/status.hpp"
@@ -31,38 +33,6 @@ struct Capacity {
 /// Room for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more
 /// effects.
 using DefaultCapacity = Capacity<64, 8, 768>;
-
-/// Constant part of a link: Rot(z, q + offset) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta).
-template <class S>
-struct LinkShape {
-  SinCos<S> offset{S(0), S(1)};
-  SinCos<S> alpha{S(0), S(1)};
-  SinCos<S> beta{S(0), S(1)};
-  S d = S(0);  ///< m
-  S a = S(0);  ///< m
-  bool has_beta = false;
-};
-
-/// A small rigid motion: of the point at the origin of its frame (m) and about it (rad).
-template <class S>
-struct SmallMotion {
-  Vec3<S> linear;
-  Vec3<S> angular;
-};
-
-/// Rigid transform of six small values: Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and rad.
-template <class S>
-inline Pose<S> small_pose(const std::array<S, 6>& v) {
-  const SinCos<S> x = sin_cos(v[slot::rx]);
-  const SinCos<S> y = sin_cos(v[slot::ry]);
-  const SinCos<S> z = sin_cos(v[slot::rz]);
-  Pose<S> pose;
-  pose.rotation << z.c * y.c, z.c * y.s * x.s - z.s * x.c, z.c * y.s * x.c + z.s * x.s,  //
-      z.s * y.c, z.s * y.s * x.s + z.c * x.c, z.s * y.s * x.c - z.c * x.s,               //
-      -y.s, y.c * x.s, y.c * x.c;
-  pose.position = Vector3<S>(v[0], v[1], v[2]);
-  return pose;
-}
 
 /// Nominal chain + terms of an arm with N revolute joints, prepared for the scalar S.
 template <class S, std::size_t N = 6, class Cap = DefaultCapacity>
@@ -221,7 +191,7 @@ class Model {
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     sort_effects();
-    take_twists();
+    compute_twists();
   }
 
   /// All of a term list at once.
@@ -272,21 +242,33 @@ class Model {
   const std::array<LinkShape<S>, N>& shapes() const { return shape_; }
   /// True where every effect turns a joint (slot theta of a link) by the load's torque, the links' own weight, or
   /// something that needs no frames. Then the arm is a rigid chain behind yielding joints.
-  bool has_only_joint_deflections() const { return only_joints_yield_; }
+  bool has_only_joint_deflections() const { return only_joint_deflections_; }
   /// True where some effect follows the load's torque or a lever.
-  bool yields_to_loads() const { return yields_to_loads_; }
+  bool has_load_deflections() const { return has_load_deflections_; }
   /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
   S compliance(std::size_t i) const { return compliance_[i]; }
-  std::size_t lever_count() const { return group_end_[lever]; }
+  std::size_t lever_count() const { return group_end_[detail::group::lever]; }
   /// Link-weight terms, equal levers side by side.
   const Term<S>& lever_term(std::size_t k) const { return effects_[order_[k]]; }
-  std::size_t other_loaded_count() const { return group_end_[other_loaded] - group_end_[lever]; }
-  const Term<S>& other_loaded_term(std::size_t k) const { return effects_[order_[group_end_[lever] + k]]; }
+  std::size_t other_loaded_count() const {
+    return group_end_[detail::group::other_loaded] - group_end_[detail::group::lever];
+  }
+  const Term<S>& other_loaded_term(std::size_t k) const {
+    return effects_[order_[group_end_[detail::group::lever] + k]];
+  }
   /// Functions of the reading of the very joint that they turn: curves, harmonics, scale.
-  std::size_t own_count() const { return group_end_[own] - group_end_[other_loaded]; }
-  const Term<S>& own_term(std::size_t k) const { return effects_[order_[group_end_[other_loaded] + k]]; }
-  std::size_t other_count() const { return group_end_[other] - group_end_[own]; }
-  const Term<S>& other_term(std::size_t k) const { return effects_[order_[group_end_[own] + k]]; }
+  std::size_t own_count() const {
+    return group_end_[detail::group::own] - group_end_[detail::group::other_loaded];
+  }
+  const Term<S>& own_term(std::size_t k) const {
+    return effects_[order_[group_end_[detail::group::other_loaded] + k]];
+  }
+  std::size_t other_count() const {
+    return group_end_[detail::group::other] - group_end_[detail::group::own];
+  }
+  const Term<S>& other_term(std::size_t k) const {
+    return effects_[order_[group_end_[detail::group::own] + k]];
+  }
   bool has_axial_gravity() const { return axial_gravity_; }  ///< along z of F0
   S inverse_gravity() const { return inverse_gravity_; }     ///< s^2/m; 0 without gravity
   bool turns_tool() const { return turns_tool_; }
@@ -307,66 +289,27 @@ class Model {
                                       tables_[t.table].column_covariate == Covariate::direction);
   }
 
-  enum Group : std::uint8_t {
-    lever = 0,
-    other_loaded = 1,
-    own = 2,
-    other = 3,
-    groups = 4,
-    summed = 5,
-    none = 6
-  };
   using Count = std::conditional_t<Cap::terms <= 255, std::uint8_t, std::uint16_t>;
 
-  /// Where the control cycle finds a term; only_joints_yield_ becomes false for one that it finds nowhere.
-  Group group_of(const Term<S>& t) {
-    if (t.place.body == body::point) return none;  // moves what is measured, not the arm
-    const bool turns_joint = t.place.body >= 1 && t.place.body <= N && t.place.slot == slot::theta;
-    const bool of_itself = t.joint + 1U == t.place.body;
-    switch (turns_joint ? t.basis : Basis::load_moment_x) {
-      case Basis::load_torque:
-        return of_itself ? summed : other_loaded;
-      case Basis::load_torque_cubed:
-        return other_loaded;
-      case Basis::link_weight:
-        return lever;
-      case Basis::curve:
-        if (t.factor == Factor::load_torque) return other_loaded;
-        return of_itself ? own : other;
-      case Basis::joint_position:
-      case Basis::sine:
-      case Basis::cosine:
-        return of_itself ? own : other;
-      case Basis::load_moment_x:
-      case Basis::load_moment_y:
-      case Basis::base_moment_x:
-      case Basis::base_moment_y:
-        only_joints_yield_ = false;
-        return none;
-      default:
-        return other;
-    }
-  }
-
   void sort_effects() {
-    only_joints_yield_ = true;
+    only_joint_deflections_ = true;
     for (S& c : compliance_) c = S(0);
-    std::array<Group, Cap::terms> group{};
-    bool summed_any = false;
+    std::array<std::uint8_t, Cap::terms> group{};
+    bool has_compliance = false;
     for (std::size_t k = 0; k < effect_count_; ++k) {
       const Term<S>& t = effects_[k];
-      group[k] = group_of(t);
-      if (group[k] != summed) continue;
+      group[k] = detail::effect_group<N>(t, only_joint_deflections_);
+      if (group[k] != detail::group::own_compliance) continue;
       compliance_[t.joint] += t.coefficient;
-      summed_any = true;
+      has_compliance = true;
     }
     std::size_t n = 0;
-    for (std::uint8_t g = 0; g < groups; ++g) {
+    for (std::uint8_t g = 0; g < detail::group::count; ++g) {
       for (std::size_t k = 0; k < effect_count_; ++k) {
         if (group[k] != g) continue;
         std::size_t at = n++;
         // Equal levers side by side, so that each is taken once.
-        if (g == lever) {
+        if (g == detail::group::lever) {
           for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at)
             order_[at] = order_[at - 1];
         }
@@ -374,7 +317,8 @@ class Model {
       }
       group_end_[g] = static_cast<Count>(n);
     }
-    yields_to_loads_ = summed_any || group_end_[other_loaded] != 0;  // the levers are in this end as well
+    has_load_deflections_ =
+        has_compliance || group_end_[detail::group::other_loaded] != 0;  // the levers are in this end as well
     const S g2 = dot<S>(gravity_, gravity_);
     using std::sqrt;
     inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);
@@ -388,38 +332,11 @@ class Model {
       }
     }
   }
-  /// The motion that takes the first pose's frame into the second one's, in the first frame and to first order.
-  static SmallMotion<S> twist_between(const Pose<S>& from, const Pose<S>& to) {
-    const Matrix3<S>& r = from.rotation;
-    const Vec3<S> shift = vec3<S>(to.position) - vec3<S>(from.position);
-    const auto into = [&r](const Vec3<S>& v) {
-      return Vec3<S>{r(0, 0) * v.x + r(1, 0) * v.y + r(2, 0) * v.z,
-                     r(0, 1) * v.x + r(1, 1) * v.y + r(2, 1) * v.z,
-                     r(0, 2) * v.x + r(1, 2) * v.y + r(2, 2) * v.z};
-    };
-    Vec3<S> turn = {S(0), S(0), S(0)};
-    for (int k = 0; k < 3; ++k) {
-      turn = turn + cross(Vec3<S>{r(0, k), r(1, k), r(2, k)},
-                          Vec3<S>{to.rotation(0, k), to.rotation(1, k), to.rotation(2, k)});
-    }
-    return {into(shift), into(turn * S(0.5))};
-  }
-  /// A link without its joint's turn.
-  static Pose<S> still_link(const LinkShape<S>& link, const SinCos<S>& theta) {
-    Pose<S> p;
-    const SinCos<S>&a = link.alpha, &b = link.beta;
-    p.position = Vector3<S>(link.a * theta.c, link.a * theta.s, link.d);
-    // Rot(z) Rot(x) Rot(y)
-    p.rotation << theta.c * b.c - theta.s * a.s * b.s, -theta.s * a.c, theta.c * b.s + theta.s * a.s * b.c,
-        theta.s * b.c + theta.c * a.s * b.s, theta.c * a.c, theta.s * b.s - theta.c * a.s * b.c,  //
-        -a.c * b.s, a.s, a.c * b.c;
-    return p;
-  }
-  void take_twists() {
+  void compute_twists() {
     for (std::size_t i = 0; i < N; ++i) {
       const SinCos<S> none = {S(0), S(1)};
-      link_twist_[i] = twist_between(still_link(nominal_[i], none),
-                                     still_link(shape_[i], sin_cos(constant_[i][slot::theta])));
+      link_twist_[i] = twist_between(link_at_zero(nominal_[i], none),
+                                     link_at_zero(shape_[i], sin_cos(constant_[i][slot::theta])));
     }
     // The tool's motion is seen from the flange, where the last link's is.
     const SmallMotion<S> tool = twist_between(nominal_tool_, tool_pose_);
@@ -464,15 +381,15 @@ class Model {
   bool reads_direction_ = false;
   bool axial_gravity_ = true;
   std::array<std::uint8_t, N> link_moves_{};
-  bool only_joints_yield_ = true;
-  bool yields_to_loads_ = false;
+  bool only_joint_deflections_ = true;
+  bool has_load_deflections_ = false;
   bool turns_tool_ = false;
   std::array<S, N> compliance_{};
   S inverse_gravity_ = S(0);
   std::array<SmallMotion<S>, N> link_twist_{};
   SmallMotion<S> base_twist_{};
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
-  std::array<Count, groups> group_end_{};
+  std::array<Count, detail::group::count> group_end_{};
   std::array<Count, Cap::terms> order_{};
   std::size_t effect_count_ = 0;
   std::size_t table_count_ = 0;

@@ -56,21 +56,21 @@ enum class Basis : std::uint8_t {
   one = 0,                ///< 1: a geometric error
   load_torque = 1,        ///< tau_joint, N·m: torque of payload and external force about the joint's axis
   load_torque_cubed = 2,  ///< tau_joint^3
-  link_weight = 3,     ///< lever s of the link of `joint` with `distal_joint` (docs/model.md, M13), 1
-  joint_position = 4,  ///< q_joint, rad
-  sine = 5,            ///< sin(argument * q_joint)
-  cosine = 6,          ///< cos(argument * q_joint)
-  direction = 7,       ///< -direction_joint: the link stays behind the motion
-  relative_speed = 8,  ///< u_joint
-  thermal = 9,         ///< (T - reference) * nominal length of the place (a or d of a link), K·m
-  time = 10,           ///< time_s
-  load_moment_x = 11,  ///< load moment about x of link `joint` at that link's origin, N·m
-  load_moment_y = 12,  ///< load moment about y of link `joint` at that link's origin, N·m
-  base_moment_x = 13,  ///< load moment about x of F0 through (0, 0, argument), N·m
-  base_moment_y = 14,  ///< load moment about y of F0 through (0, 0, argument), N·m
-  curve = 15,          ///< periodic cubic B-spline of q_joint in table `table`, times `factor`
-  step = 16,           ///< 1 where time_s >= argument, else 0
-  grid = 17,           ///< bilinear table of two covariates in table `table`, constant outside
+  link_weight = 3,        ///< lever s of the link of `joint` with `distal_joint` (docs/model.md, M13), 1
+  joint_position = 4,     ///< q_joint, rad
+  sine = 5,               ///< sin(argument * q_joint)
+  cosine = 6,             ///< cos(argument * q_joint)
+  direction = 7,          ///< -direction_joint: the link stays behind the motion
+  relative_speed = 8,     ///< u_joint
+  thermal = 9,            ///< (T - reference) * nominal length of the place (a or d of a link), K·m
+  time = 10,              ///< time_s
+  load_moment_x = 11,     ///< load moment about x of link `joint` at that link's origin, N·m
+  load_moment_y = 12,     ///< load moment about y of link `joint` at that link's origin, N·m
+  base_moment_x = 13,     ///< load moment about x of F0 through (0, 0, argument), N·m
+  base_moment_y = 14,     ///< load moment about y of F0 through (0, 0, argument), N·m
+  curve = 15,             ///< periodic cubic B-spline of q_joint in table `table`, times `factor`
+  step = 16,              ///< 1 where time_s >= argument, else 0
+  grid = 17,              ///< bilinear table of two covariates in table `table`, constant outside
 };
 constexpr std::uint8_t basis_count = 18;
 
@@ -127,8 +127,8 @@ struct Term {
   Effect effect = Effect::geometric;  ///< the name it goes by
   std::uint16_t instance = 0;         ///< terms of one effect with the same number enter and leave together
   std::uint16_t table = no_table;     ///< index into the tables
-  std::uint8_t distal_joint = 0;      ///< of a link-weight lever: the joint (from 0) at its distal end; 0: none
-  S argument = S(0);                  ///< order, pivot height (m) or time (s), by basis
+  std::uint8_t distal_joint = 0;  ///< of a link-weight lever: the joint (from 0) at its distal end; 0: none
+  S argument = S(0);              ///< order, pivot height (m) or time (s), by basis
   S coefficient = S(1);
 };
 

@@ -36,8 +36,7 @@ inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t
   static std::array<flexcomp::Term<Scalar>, paper_terms + 6> terms;
   static std::array<flexcomp::Table, 6> tables;
   static std::array<Scalar, 6 * curve_values> values;
-  for (std::size_t k = 0; k < paper_terms; ++k)
-    terms[k] = selftest::make_term<Scalar>(selftest::entries[k]);
+  for (std::size_t k = 0; k < paper_terms; ++k) terms[k] = selftest::make_term<Scalar>(selftest::entries[k]);
   std::uint32_t state = 2019;
   for (Scalar& v : values) {
     state = state * 1664525U + 1013904223U;

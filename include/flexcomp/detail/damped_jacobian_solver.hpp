@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The factored Jacobian and its damped solution: from an error of the pose to a correction of the joints.
+/// Damped least-squares solution of J dq = e, position before orientation (docs/compensation.md, C8 to C10).
 ///
 /// J J^T is factored in 3x3 blocks, position first:
 ///
 ///     [P  Q^T] [u]   [e_p]        P = Jp Jp^T + lp^2 1,   Q = Jo Jp^T,
 ///     [Q  O  ] [v] = [e_o],       M = Jo Jo^T - Q P^-1 Q^T + lo^2 1,   dq = Jp^T u + Jo^T v
 ///
-/// Both dampings are zero where the arm is regular. Near a singularity lo grows first and smoothly: the first
-/// block row still holds exactly, so the arm gives up orientation before position. lp grows only where the
-/// position itself cannot be reached. The correction is kept in two parts: what the position needs, and what
-/// the orientation still needs without moving the tool point. Each is scaled down as a whole, never joint by
-/// joint, and the second is allowed less from one correction to the next: so the last word is the position's,
-/// also where a stretched arm could only chase its orientation for ever.
+/// Both dampings (C9) are zero where the arm is regular. Near a singularity lo grows first and smoothly: the first block
+/// row still holds exactly, so the error stays in the orientation. lp grows only where the position itself is singular.
+/// The solution has two parts: one for the position, and one for the orientation that leaves the tool point in place.
+/// Each is scaled as a whole, never joint by joint, and the second is limited more strictly from one correction to the
+/// next (C10), because at a stretched arm its corrections would not converge.
 #ifndef FLEXCOMP_DETAIL_DAMPED_JACOBIAN_SOLVER_HPP
 #define FLEXCOMP_DETAIL_DAMPED_JACOBIAN_SOLVER_HPP
 
@@ -24,17 +23,6 @@
 #include "flexcomp/linear.hpp"
 
 namespace flexcomp {
-
-/// Limits of the compensation. The defaults suit arms of 0.3 to 4 m whose errors are below 20 mm.
-template <class S>
-struct CompensationSettings {
-  S largest_correction_rad = S(0.1);  ///< of any joint; a larger correction is scaled down as a whole
-  /// Below this value of (trace of the inverse block)^-1/2, m/rad for position and 1 for orientation, damping
-  /// sets in. An arm whose Jacobian has a smallest singular value of 0.1 (lengths in m) is never below
-  /// 0.1/sqrt(3).
-  S singular_below = S(0.05);
-  S damping = S(0.1);  ///< at the singularity itself
-};
 
 namespace detail {
 
@@ -53,9 +41,8 @@ struct Symmetric {
   }
 };
 
-/// Inverse of a symmetric positive block plus smooth damping. `regular` becomes 1 / trace(A^-1), never above the
-/// square of the smallest singular value, where it was larger; below the square of settings.singular_below damping
-/// sets in.
+/// Inverse of a symmetric positive block with damping (C9). `regular` becomes the smaller one of itself and
+/// kappa = 1 / trace(A^-1), which is at most the square of the smallest singular value.
 template <class S>
 inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings,
                            Symmetric<S>& inverse, S& regular) {
@@ -80,16 +67,25 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
   inverse = e.over(d.xx * e.xx + d.xy * e.xy + d.xz * e.xz);
 }
 
-/// The factored Jacobian of one pose; every correction of a cycle uses it.
+/// Limit of the orientation part in a correction (0, 1, 2), relative to the largest correction (C10). A regular pose needs
+/// far less in the second and third; a stretched arm would use all of it.
+template <class S>
+constexpr S allowed_turn(int correction) {
+  return correction == 0 ? S(1) : correction == 1 ? S(0.2) : S(0.02);
+}
+
+/// Most corrections of a command: one from the nominal pose and two from the chain itself.
+constexpr int most_corrections = 3;
+/// Block factorisation of the Jacobian of one pose, and its damped solutions (C8).
 ///
-/// Here and below structures are read and written scalar by scalar: copied as a whole they would go through memory.
+/// Structures are read and written scalar by scalar: copied as a whole they would go through memory.
 template <class S, std::size_t N>
 class DampedJacobianSolver {
  public:
-  /// Axes and origins of the joints of the pose, in F0: to be filled in before set(), which uses them up.
+  /// Axes and origins of the joints of the pose, in F0 (m): filled in before set(), which overwrites them.
   std::array<JointAxis<S>, N>& joints() { return column_; }
 
-  /// Factors the Jacobian at the point `tool`, in F0.
+  /// Factors the Jacobian at the tool point, in F0, m. Work: one pass over the joints, two 3x3 inverses.
   void set(const Vec3<S>& tool, const CompensationSettings<S>& settings) {
     regular_ = S(1);
     Symmetric<S> block;
@@ -170,20 +166,18 @@ class DampedJacobianSolver {
     zz -= gain_[8] * q[8];
     block = {xx, yy, zz, xy, xz, yz};
     damped_inverse(block, settings, orientation_, regular_);
-    if (!(regular_ >= settings.singular_below * settings.singular_below)) gave_up_ = true;
+    if (!(regular_ >= settings.singular_below * settings.singular_below)) damped_ = true;
   }
 
-  /// Whether any correction so far was damped or scaled down.
-  bool is_damped() const { return gave_up_; }
-  /// Never above the square of the smallest singular value of either block (m^2, or 1 for orientation).
+  /// True where any solution so far was damped (C9) or scaled (C10).
+  bool is_damped() const { return damped_; }
+  /// kappa of (C9), the smaller one of both blocks, at most 1: m^2, or 1 for orientation.
   S regular() const { return regular_; }
-  /// True where joints that turned by this sum of squares (rad^2) since set() have made the factored Jacobian a tenth
-  /// wrong or more.
+  /// True where turns of the joints since set() with this sum of squares (rad^2) change the Jacobian by a tenth or more.
   bool jacobian_is_stale(S square) const { return !(square <= S(0.01) * regular_); }
 
-  /// Joint correction for a position error (m) and a small orientation error (rad), both in F0: what the
-  /// position needs, no joint more than `largest`, plus what the orientation still needs while the tool point
-  /// stays, no joint more than `largest_turn` (rad). Returns the sum of its squares.
+  /// Solution (C8) for errors of position (m) and orientation (rad) in F0: joint turns dq, rad. The position part is
+  /// limited to `largest`, the orientation part to `largest_turn` (C10). Returns the sum of squares of dq.
   S solve(const Vec3<S>& position, const Vec3<S>& orientation, S largest, S largest_turn,
           std::array<S, N>& dq) {
     const S px = position.x, py = position.y, pz = position.z;
@@ -199,7 +193,7 @@ class DampedJacobianSolver {
     const S wx = gain_[0] * vx + gain_[3] * vy + gain_[6] * vz;
     const S wy = gain_[1] * vx + gain_[4] * vy + gain_[7] * vz;
     const S wz = gain_[2] * vx + gain_[5] * vy + gain_[8] * vz;
-    // |shift|^2 <= u . position and |turn|^2 <= v . rest: nearly always nothing has to be scaled down.
+    // |position part|^2 <= u . position and |orientation part|^2 <= v . e: in most cases nothing has to be scaled.
     if (!(ux * px + uy * py + uz * pz <= largest * largest &&
           vx * ex + vy * ey + vz * ez <= largest_turn * largest_turn)) {
       return solve_limited({ux, uy, uz}, {vx, vy, vz}, {wx, wy, wz}, largest, largest_turn, dq);
@@ -231,18 +225,18 @@ class DampedJacobianSolver {
       dq[i] = dot(column_[i].origin, u);
       turn[i] = dot(column_[i].axis, v) - dot(column_[i].origin, w);
     }
-    if (scale_to_limit(dq, largest)) gave_up_ = true;
-    if (scale_to_limit(turn, largest_turn)) gave_up_ = true;
+    if (scale_to_limit(dq, largest)) damped_ = true;
+    if (scale_to_limit(turn, largest_turn)) damped_ = true;
     for (std::size_t i = 0; i < N; ++i) dq[i] += turn[i];
     return square_of(dq);
   }
 
-  std::array<JointAxis<S>, N> column_;  ///< axis, and in the place of the origin axis x (tool - origin)
+  std::array<JointAxis<S>, N> column_;  ///< axis, and in the place of the origin: axis x (tool - origin)
   Symmetric<S> position_;
   Symmetric<S> orientation_;
   S gain_[9];  ///< rows of Q P^-1
   S regular_ = S(0);
-  bool gave_up_ = false;
+  bool damped_ = false;
 };
 
 }  // namespace detail

@@ -1,27 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How far the joints yield: torques of the load and levers of the links' own weight, carried link by link in the
-/// links' own frames, and what else turns a joint. For the control cycle, and only for sets whose effects all turn
-/// joints (Model::has_only_joint_deflections()).
+/// Joint deflections by loads and link weight (docs/compensation.md, C12 and C13), for sets whose effects all turn joints
+/// (Model::has_only_joint_deflections()).
 ///
-/// The torques are those of forward.hpp (Chen et al. 2019, Eq. 10-13), where the load is one force and one moment in
-/// F0. Here gravity goes outward and the moment inward (the static part of the recursive Newton-Euler method, Luh,
-/// Walker and Paul 1980), which needs neither axes nor origins in F0 and half as many operations; core_yield_test
-/// holds the two together.
+/// The torques are those of forward.hpp (M11), where the load is one force and one moment in F0. Here gravity is
+/// propagated outward and the moment inward in the links' own frames: the static part of the recursive Newton-Euler
+/// method (Luh, Walker and Paul 1980). It needs neither axes nor origins in F0 and half as many operations;
+/// core_joint_deflection_test compares the two.
 #ifndef FLEXCOMP_DETAIL_JOINT_DEFLECTION_HPP
 #define FLEXCOMP_DETAIL_JOINT_DEFLECTION_HPP
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
+#include "flexcomp/detail/own_deflection.hpp"
 #include "flexcomp/detail/rigid_chain.hpp"
-#include "flexcomp/forward.hpp"
 
 namespace flexcomp {
 namespace detail {
 
-/// The load of one control cycle.
+/// Payload, gravity and external force of one control cycle (M8).
 template <class S>
 struct StaticLoad {
   S mass_kg;
@@ -33,7 +31,7 @@ struct StaticLoad {
 };
 
 template <class S, std::size_t N, class Cap>
-inline void carried_load(const Model<S, N, Cap>& model, const Context<S, N>& context, StaticLoad<S>& load) {
+inline void static_load(const Model<S, N, Cap>& model, const Context<S, N>& context, StaticLoad<S>& load) {
   const std::array<S, 4>& edit = model.load_edit();
   load.mass_kg = context.payload_kg + edit[slot::mass];
   load.gravity = vec3<S>(model.gravity());
@@ -45,9 +43,9 @@ inline void carried_load(const Model<S, N, Cap>& model, const Context<S, N>& con
   load.is_plain = !load.has_force && model.has_axial_gravity();
 }
 
-/// A direction from the frame after a link into the one between its Rot(z) and its Trans.
+/// Coordinates of a direction: from the frame after a link to the middle frame, between its Rot(z) and its Trans.
 template <class S>
-inline Vec3<S> out_of_end(const LinkShape<S>& link, const Vec3<S>& v) {
+inline Vec3<S> link_end_to_middle(const LinkShape<S>& link, const Vec3<S>& v) {
   S x = v.x, z = v.z;
   if (link.has_beta) {
     x = link.beta.c * v.x + link.beta.s * v.z;
@@ -55,20 +53,20 @@ inline Vec3<S> out_of_end(const LinkShape<S>& link, const Vec3<S>& v) {
   }
   return {x, link.alpha.c * v.y - link.alpha.s * z, link.alpha.s * v.y + link.alpha.c * z};
 }
-/// From there into the frame before the link's joint.
+/// Coordinates of a direction: from the middle frame to the frame before the link's joint.
 template <class S>
-inline Vec3<S> out_of_middle(const SinCos<S>& theta, const Vec3<S>& v) {
+inline Vec3<S> middle_to_link_start(const SinCos<S>& theta, const Vec3<S>& v) {
   return {theta.c * v.x - theta.s * v.y, theta.s * v.x + theta.c * v.y, v.z};
 }
 
-/// A constant force field in each link's middle frame, and the torque about each joint of a unit force of it.
+/// A uniform field in each link's middle frame, and the torque about each joint per unit of mass or force (C12).
 template <class S, std::size_t N>
 struct LinkLoads {
   std::array<Vec3<S>, N> field;
   std::array<S, N> torque;
 };
 
-/// Carries a field given in F0 outward, and the moment that it has on `arm` (in the flange frame, m) inward.
+/// Propagates a field of F0 outward, and inward its moment on `arm` (flange frame, m), as in (C12). Work: two passes.
 template <class S, std::size_t N>
 inline void propagate_statics(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
                               const Vec3<S>& field, const Vec3<S>& arm, LinkLoads<S, N>& out) {
@@ -117,21 +115,21 @@ inline void propagate_statics(const std::array<LinkShape<S>, N>& links, const st
   }
 }
 
-/// link_weight_lever() of forward.hpp, taken in the middle frame of the joint's link.
+/// Link-weight lever (M13) of a joint, in the middle frame of its link.
 template <class S, std::size_t N, class Cap>
-inline S carried_lever(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
-                       const LinkLoads<S, N>& loads, std::size_t joint, std::size_t far) {
+inline S lever_in_link_frame(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
+                             const LinkLoads<S, N>& loads, std::size_t joint, std::size_t distal) {
   const std::array<LinkShape<S>, N>& links = model.shapes();
   S x = links[joint].a, y = S(0);
-  if (far > joint + 1) {
+  if (distal > joint + 1) {
     Vec3<S> arm = {S(0), S(0), S(0)};
-    for (std::size_t k = far - 1; k > joint; --k) {
-      arm = out_of_end(links[k], arm);
+    for (std::size_t k = distal - 1; k > joint; --k) {
+      arm = link_end_to_middle(links[k], arm);
       arm.x += links[k].a;
       arm.z += links[k].d;
-      arm = out_of_middle(angle[k], arm);
+      arm = middle_to_link_start(angle[k], arm);
     }
-    arm = out_of_end(links[joint], arm);
+    arm = link_end_to_middle(links[joint], arm);
     x += arm.x;
     y = arm.y;
   }
@@ -153,60 +151,7 @@ inline void add_force_torques(const Model<S, N, Cap>& model, const std::array<Si
   }
 }
 
-/// A function of a joint's reading around one reading: value, slope per rad and half the curvature.
-template <class S>
-struct Local {
-  S value, slope, half_curvature;
-};
-
-/// Adds k times the cubic of the cell in which the reading lies (curve_weights() of forward.hpp in powers of the
-/// distance).
-template <class S, std::size_t N, class Cap>
-inline void add_local_curve(const Model<S, N, Cap>& model, const Term<S>& term, const S& q, const S& k,
-                            Local<S>& sum) {
-  const Table& table = model.table(term.table);
-  const std::int32_t m = table.size;
-  const S per_rad = S(static_cast<float>(table.size)) * S(0.15915494309189533577);
-  const S t = q * per_rad;
-  std::int32_t cell = 0;
-  // As in curve_weights(): far inside 32 bits, and a NaN gives cell 0.
-  if (t * t < S(1e14F)) cell = truncate(t);
-  S u = t - S(static_cast<float>(cell));
-  if (u < S(0)) {
-    u += S(1);
-    --cell;
-  }
-  std::int32_t first = (cell - 1) % m;
-  if (first < 0) first += m;
-  const S* from = model.values(table) + first;
-  S c0 = from[0], c1, c2, c3;
-  if (first + 3 < m) {
-    c1 = from[1];
-    c2 = from[2];
-    c3 = from[3];
-  } else {
-    c1 = from[first + 1 < m ? 1 : 1 - m];
-    c2 = from[first + 2 < m ? 2 : 2 - m];
-    c3 = from[3 - m];
-  }
-  // p0 + p1 u + p2 u^2 + p3 u^3
-  S p3 = (c1 - c2) * S(0.5);
-  p3 += (c3 - c0) * S(1.0 / 6);
-  S p2 = (c0 + c2) * S(0.5);
-  p2 -= c1;
-  const S p1 = (c2 - c0) * S(0.5);
-  S p0 = p2 * S(1.0 / 3);
-  p0 += c1;
-  const S bend = u * p3;
-  const S half = p2 + bend + bend + bend;  // of the second derivative
-  const S value = p1 + u * (p2 + bend);
-  sum.value += k * (p0 + u * value);
-  const S scale = k * per_rad;
-  sum.slope += scale * (p1 + u * (p2 + half));
-  sum.half_curvature += scale * per_rad * half;
-}
-
-/// Adds what levers and other loaded terms do, once the torques are known; lever(joint, far) gives a lever.
+/// Adds the deflections by link weight (M14), rad; lever(joint, distal) gives a lever (M13).
 template <class S, std::size_t N, class Cap, class Lever>
 inline void add_levers(const Model<S, N, Cap>& model, const Lever& lever, std::array<S, N>& delta) {
   const std::size_t count = model.lever_count();
@@ -214,7 +159,7 @@ inline void add_levers(const Model<S, N, Cap>& model, const Lever& lever, std::a
   S value = S(0);
   for (std::size_t k = 0; k < count; ++k) {
     const Term<S>& term = model.lever_term(k);
-    // Equal levers stand side by side.
+    // Equal levers are adjacent.
     const std::uint32_t this_one = (std::uint32_t{term.joint} << 16U) | term.distal_joint;
     if (this_one != which) {
       which = this_one;
@@ -233,15 +178,15 @@ FLEXCOMP_ONCE void add_other_loaded(const Model<S, N, Cap>& model, const std::ar
     if (term.basis == Basis::load_torque_cubed) {
       value *= torque * torque;
     } else if (term.basis == Basis::curve) {
-      Local<S> at = {S(0), S(0), S(0)};
-      add_local_curve(model, term, q[term.joint], S(1), at);
+      Expansion<S> at = {S(0), S(0), S(0)};
+      expand_curve(model, term, q[term.joint], S(1), at);
       value *= at.value;
     }
     delta[term.place.body - 1U] += value;
   }
 }
 
-/// What the load and the links' own weight do to every joint (rad): compliances, levers, and curves times torque.
+/// Deflection of every joint by load and link weight, rad: compliances (M12), levers (M14), curves times torque.
 template <class S, std::size_t N, class Cap>
 FLEXCOMP_ONCE void load_deflection(const Model<S, N, Cap>& model, const std::array<S, N>& q,
                                    const std::array<SinCos<S>, N>& angle, const StaticLoad<S>& load,
@@ -258,15 +203,16 @@ FLEXCOMP_ONCE void load_deflection(const Model<S, N, Cap>& model, const std::arr
   if (load.has_force) add_force_torques(model, angle, load, loads.torque, delta);
   add_levers(
       model,
-      [&](std::size_t joint, std::size_t far) { return carried_lever(model, angle, loads, joint, far); },
+      [&](std::size_t joint, std::size_t distal) {
+        return lever_in_link_frame(model, angle, loads, joint, distal);
+      },
       delta);
   if (model.other_loaded_count() != 0) add_other_loaded(model, q, loads.torque, delta);
 }
 
-/// load_deflection() at the angles of a chain whose axes are at hand, and how it changes beside them: moments about the
-/// axes in F0, as in forward.hpp. Only for gravity along z of F0 and without external force (StaticLoad::is_plain).
-/// The change leaves out what is of second order, and the bend of links between a lever's ends: it is there to start
-/// well, not to end with.
+/// load_deflection() of a chain whose axes are known, and its first-order change (C13): moments about axes in F0, (M11).
+/// Only for gravity along z of F0 and without external force (StaticLoad::is_plain). The change leaves out the second
+/// order and the motion of joints between a lever's ends: it is the start of (C15), not its result.
 template <class S, std::size_t N>
 class LinearisedDeflection {
  public:
@@ -291,15 +237,15 @@ class LinearisedDeflection {
     const S sign = load.gravity.z * model.inverse_gravity();
     add_levers(
         model,
-        [&](std::size_t joint, std::size_t far) {
+        [&](std::size_t joint, std::size_t distal) {
           const Vec3<S>& z = joints[joint].axis;
-          const Vec3<S>&near = joints[joint].origin, &end = joints[far].origin;
-          const S rx = end.x - near.x, ry = end.y - near.y, rz = end.z - near.z;
+          const Vec3<S>&proximal = joints[joint].origin, &end = joints[distal].origin;
+          const S rx = end.x - proximal.x, ry = end.y - proximal.y, rz = end.z - proximal.z;
           const S x = z.y * rz - z.z * ry, y = z.z * rx - z.x * rz, h = z.x * ry - z.y * rx;
           const S square = x * x + y * y + h * h;
           using std::sqrt;
           const S k = square > S(1e-6) ? sign / sqrt(square) : S(0);
-          if (levers_ < most_levers) {
+          if (levers_ < max_levers) {
             lever_[levers_].x = x * k;
             lever_[levers_].y = y * k;
           }
@@ -317,11 +263,11 @@ class LinearisedDeflection {
     }
   }
 
-  /// By how much the yield changes (rad) when the joints turn by `by`.
+  /// First-order change of the deflection (rad) when the joints turn by `by` (rad).
   template <class Cap>
   void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints,
               const std::array<S, N>& by, std::array<S, N>& delta) const {
-    // The arm's z is what the weight turns a joint by; outer joints move its end, inner ones turn it as a whole.
+    // The z of axis x arm gives the torque: joints further out move the arm's end, joints further in turn it as a whole.
     S ux = S(0), uy = S(0);
     for (std::size_t i = N; i-- > 0;) {
       const S v = by[i];
@@ -343,7 +289,7 @@ class LinearisedDeflection {
       turned[i].y = wy;
       delta[i] = d * weight * model.compliance(i);
     }
-    if (levers_ > most_levers) return;
+    if (levers_ > max_levers) return;
     const Planar* next = lever_.data();
     add_levers(
         model,
@@ -358,67 +304,14 @@ class LinearisedDeflection {
   struct Planar {
     S x, y;
   };
-  static constexpr std::size_t most_levers = 4;
+  static constexpr std::size_t max_levers = 4;
 
   std::array<Planar, N> arm_;  ///< x, y of axis x (centre of mass - origin)
-  std::array<Planar, most_levers>
-      lever_;  ///< x, y of axis x (far - near) as a unit vector; its z is the lever
+  /// x, y of axis x (distal - proximal origin) as a unit vector; its z is the lever.
+  std::array<Planar, max_levers> lever_;
   std::size_t levers_;
   S weight_;
 };
-
-/// Adds what a term of Model::own_term() does, and how it goes on beside this reading.
-template <class S, std::size_t N, class Cap>
-inline void add_own_yield(const Model<S, N, Cap>& model, const Term<S>& term, const S& q,
-                          const Context<S, N>& context, Local<S>& sum) {
-  S k = term.coefficient;
-  if (term.basis == Basis::curve) {
-    if (term.factor == Factor::temperature) k *= context.temperature_c - model.reference_temperature();
-    if (term.factor == Factor::payload) k *= context.payload_kg;
-    add_local_curve(model, term, q, k, sum);
-  } else if (term.basis == Basis::joint_position) {
-    sum.value += k * q;
-    sum.slope += k;
-  } else {
-    const S order = term.argument;
-    const SinCos<S> wave = sin_cos(order * q);
-    const bool is_sine = term.basis == Basis::sine;
-    const S f = k * (is_sine ? wave.s : wave.c);
-    sum.value += f;
-    sum.slope += k * order * (is_sine ? wave.c : -wave.s);
-    sum.half_curvature -= S(0.5) * order * order * f;
-  }
-}
-
-/// What turns joints without frames and not by their own reading alone.
-template <class S, std::size_t N, class Cap>
-inline void add_other_yield(const Model<S, N, Cap>& model, const std::array<S, N>& q,
-                            const Context<S, N>& context, std::array<S, N>& yield) {
-  for (std::size_t k = 0; k < model.other_count(); ++k) {
-    const Term<S>& term = model.other_term(k);
-    yield[term.place.body - 1U] += term.coefficient * plain_basis_value(model, term, context, q);
-  }
-}
-
-/// Takes the terms of Model::own_term() off the readings q: x + own(x) = q by Newton's method, with the curvature.
-template <class S, std::size_t N, class Cap>
-inline void take_own_yield(const Model<S, N, Cap>& model, const Context<S, N>& context, std::array<S, N>& q,
-                           std::array<S, N>& dq, std::array<S, N>& share) {
-  std::array<Local<S>, N> own;
-  for (Local<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
-  for (std::size_t k = 0; k < model.own_count(); ++k) {
-    const Term<S>& term = model.own_term(k);
-    add_own_yield(model, term, q[term.joint], context, own[term.joint]);
-  }
-  for (std::size_t i = 0; i < N; ++i) {
-    const S w = S(1) / (S(1) + own[i].slope);
-    const S newton = own[i].value * w;
-    const S step = newton + own[i].half_curvature * newton * newton * w;
-    share[i] = w;
-    q[i] -= step;
-    dq[i] -= step;
-  }
-}
 
 }  // namespace detail
 }  // namespace flexcomp

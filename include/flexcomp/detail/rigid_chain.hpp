@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The chain with its constant terms alone, as the control cycle needs it: sines and cosines, axes and origins of the
-/// joints and the flange, small motions of them; written out in scalars so that a link stays in the processor's registers.
+/// Kinematics of the chain with its constant terms alone, for the control cycle: axes, origins, flange, and small motions
+/// (docs/model.md, M2 and M17). Written out in scalars so that a link stays in the processor's registers.
 #ifndef FLEXCOMP_DETAIL_RIGID_CHAIN_HPP
 #define FLEXCOMP_DETAIL_RIGID_CHAIN_HPP
 
@@ -14,24 +14,26 @@
 namespace flexcomp {
 namespace detail {
 
-/// Joint i (from 0) turns about `axis` through `origin`; all in F0, m.
+/// Axis of a joint: unit direction, and a point of it; in F0, m.
 template <class S>
 struct JointAxis {
   Vec3<S> axis;
   Vec3<S> origin;
 };
 
+/// Pose of the flange frame in F0, m.
 template <class S>
 struct FlangePose {
   Mat3<S> axes;  ///< columns of its rotation
   Vec3<S> origin;
 };
 
-/// Carries the chain from F0 to the flange. `angle` are the sines and cosines with the links' offsets.
+/// Forward kinematics of a rigid chain (M2): axes and origins of its joints, and its flange, in F0. `angle` holds sines and
+/// cosines of readings plus offsets. Work: at most 30 multiplications per link.
 template <class S, std::size_t N>
 inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
                        std::array<JointAxis<S>, N>& joints, FlangePose<S>& flange) {
-  // The first link starts from the axes of F0, which leaves little of it.
+  // The first link starts from the axes of F0: most products are by 0 or 1.
   const LinkShape<S>& first = links[0];
   joints[0] = {{S(0), S(0), S(1)}, {S(0), S(0), S(0)}};
   S xx = angle[0].c, xy = angle[0].s, xz = S(0);
@@ -102,8 +104,8 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
   flange.origin = {px, py, pz};
 }
 
-/// How the constant terms move the flange of the nominal chain, to first order: twists carried from the flange to F0,
-/// where the motion is given at the origin. `angle` as in the nominal rigid_pass().
+/// Twist of the flange by the constant terms, to first order (C3): at the origin of F0, m and rad. The links' twists are
+/// added up from the flange inward. `angle` as in the nominal rigid_pass().
 template <class S, std::size_t N, class Cap>
 inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
                            SmallMotion<S>& out) {
@@ -147,8 +149,8 @@ inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCo
   out.angular = {wx, wy, wz};
 }
 
-/// sin(angle) * axis of the rotation that turns `from` into `to` (columns), in the outer frame; exact to third
-/// order.
+/// Orientation error (C5), sin(angle) times the axis of the rotation from `from` to `to` (columns), in the outer frame; it
+/// is the rotation vector to third order.
 template <class S>
 inline void rotation_error(const Mat3<S>& to, const Mat3<S>& from, Vec3<S>& error) {
   S x = from.a.y * to.a.z - from.a.z * to.a.y;
@@ -171,7 +173,7 @@ inline void rotation_error(const Mat3<S>& to, const Mat3<S>& from, Vec3<S>& erro
   error.z = S(0.5) * z;
 }
 
-/// A point of the flange frame, in F0.
+/// Coordinates in F0 of a point of the flange frame, m.
 template <class S>
 inline void flange_point(const FlangePose<S>& flange, const Vec3<S>& at, Vec3<S>& point) {
   const S x = at.x, y = at.y, z = at.z;
@@ -181,11 +183,11 @@ inline void flange_point(const FlangePose<S>& flange, const Vec3<S>& at, Vec3<S>
   point.z = flange.origin.z + (f.a.z * x + f.b.z * y + f.c.z * z);
 }
 
-/// How the tool point (m) and the rotation (rad) move when the joints of this chain turn by dq, to second order.
+/// Motion of the tool point (m) and rotation (rad) by joint turns dq (rad), to second order (C6).
 template <class S, std::size_t N>
 inline void motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool, const std::array<S, N>& dq,
                    SmallMotion<S>& out) {
-  // From the flange inward: what the outer joints do is turned by the inner ones.
+  // From the flange inward: each joint turns the motion of those further out.
   S px = tool.x, py = tool.y, pz = tool.z;
   S wx = S(0), wy = S(0), wz = S(0);
   for (std::size_t i = N; i-- > 0;) {
@@ -222,7 +224,8 @@ inline void motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool
   out.angular = {wx, wy, wz};
 }
 
-/// Of the readings with the links' offsets. The readings lie within the limits of a Model, thus in the kernel's range.
+/// Sines and cosines of readings plus the links' offsets. The readings are within the limits of a Model, thus in the
+/// range of the kernel.
 template <class S, std::size_t N>
 inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
                         std::array<SinCos<S>, N>& angle) {
@@ -235,17 +238,18 @@ inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>
   }
 }
 
+/// rotate_all() for turns of any size.
 template <class S, std::size_t N>
-FLEXCOMP_ONCE void rotate_all_far(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
+FLEXCOMP_ONCE void rotate_all_large(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
   for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
 }
 
-/// Turns all angles; `square` is the sum of the squares. Without the last terms of rotate(): up to 1/64 rad they leave
-/// 1e-11.
+/// Adds turns to all angles; `square` is their sum of squares, rad^2. Without the last terms of rotate(), which are below
+/// 1e-11 up to 1/64 rad.
 template <class S, std::size_t N>
 FLEXCOMP_ONCE void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
   if (!(square < S(0.000244140625))) {
-    rotate_all_far(angle, by);
+    rotate_all_large(angle, by);
     return;
   }
   for (std::size_t i = 0; i < N; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the control cycle computes in its own way, against the forward model that everything else uses: torques and
-// levers carried through the links' frames, curves in powers, first-order motions; and the way of sets whose effects
+// levers deflection through the links' frames, curves in powers, first-order motions; and the way of sets whose effects
 // only turn joints against the way of all other sets.
 #include <flexcomp/compensate.hpp>
 
@@ -42,18 +42,18 @@ arms::TermSet<double> loaded_terms(const arms::Arm& arm, arms::Random& random) {
   set.add(arms::on_load(slot::com_y), Basis::one, -0.01);
   set.add(arms::on_tool(slot::x), Basis::one, 0.002);
   for (std::size_t i = 0; i < 6; ++i) {
-    set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.around(1e-7), i);
-    set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.around(1e-5), i);
+    set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.linearised(1e-7), i);
+    set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.linearised(1e-5), i);
   }
   std::vector<double> c(24);
-  for (double& v : c) v = random.around(1e-5);
+  for (double& v : c) v = random.linearised(1e-5);
   flexcomp::Term<double>& t = set.add(arms::on_link(3, slot::theta), Basis::curve, 1.0, 2);
   t.table = set.add_curve(c);
   t.factor = Factor::load_torque;
   return set;
 }
 
-TEST(Yield, TorquesAndLeversAreThoseOfTheForwardModel) {
+TEST(JointDeflection, TorquesAndLeversAreThoseOfTheForwardModel) {
   arms::Random random(31);
   double worst = 0, largest = 0;
   for (const arms::Arm& arm : arms::all()) {
@@ -68,22 +68,22 @@ TEST(Yield, TorquesAndLeversAreThoseOfTheForwardModel) {
       flexcomp::Workspace<double> ws;
       flexcomp::forward(model, q, context, ws);
       detail::StaticLoad<double> load;
-      detail::carried_load(model, context, load);
+      detail::static_load(model, context, load);
       ASSERT_EQ(load.is_plain, n % 2 == 0);
-      Joints yield;
-      detail::load_deflection(model, q, angles(model, q), load, yield);
+      Joints deflection;
+      detail::load_deflection(model, q, angles(model, q), load, deflection);
       for (std::size_t i = 0; i < 6; ++i) {
-        worst = std::max(worst, std::abs(yield[i] - ws.slots.link[i][slot::theta]));
-        largest = std::max(largest, std::abs(yield[i]));
+        worst = std::max(worst, std::abs(deflection[i] - ws.slots.link[i][slot::theta]));
+        largest = std::max(largest, std::abs(deflection[i]));
       }
     }
   }
-  std::printf("[ measured ] yield up to %.1e rad, both ways agree to %.1e rad\n", largest, worst);
+  std::printf("[ measured ] deflection up to %.1e rad, both ways agree to %.1e rad\n", largest, worst);
   EXPECT_GT(largest, 1e-3);
   EXPECT_LE(worst, 1e-13);
 }
 
-TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
+TEST(JointDeflection, AroundAChainItIsTheSameAndChangesAsItShould) {
   arms::Random random(32);
   double worst = 0, worst_change = 0;
   for (const arms::Arm& arm : arms::all()) {
@@ -92,24 +92,24 @@ TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
     ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
     const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
     detail::StaticLoad<double> load;
-    detail::carried_load(model, context, load);
+    detail::static_load(model, context, load);
     ASSERT_TRUE(load.is_plain);
     for (int n = 0; n < 20000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
       std::array<detail::JointAxis<double>, 6> joints;
       detail::FlangePose<double> flange;
       detail::rigid_pass(model.shapes(), angles(model, q), joints, flange);
-      Joints carried, around, change, moved;
-      detail::load_deflection(model, q, angles(model, q), load, carried);
+      Joints deflection, linearised, change, moved;
+      detail::load_deflection(model, q, angles(model, q), load, deflection);
       detail::LinearisedDeflection<double, 6> chain;
-      chain.set(model, q, joints, flange, load, around);
-      for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(carried[i] - around[i]));
+      chain.set(model, q, joints, flange, load, linearised);
+      for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(deflection[i] - linearised[i]));
 
       // Against differences. What bends a link between a lever's ends is left out on purpose: that is joint 4 of the
       // arm with three parallel axes.
       Joints by, beyond = q, before = q;
       for (std::size_t i = 0; i < 6; ++i) {
-        by[i] = i == 3 && arm.parallel_3 ? 0 : random.around(1e-4);
+        by[i] = i == 3 && arm.parallel_3 ? 0 : random.linearised(1e-4);
         beyond[i] += by[i];
         before[i] -= by[i];
       }
@@ -123,27 +123,27 @@ TEST(Yield, AroundAChainItIsTheSameAndChangesAsItShould) {
       }
     }
   }
-  std::printf("[ measured ] around a chain to %.1e rad; for turns of 1e-4 rad the change to %.1e rad\n",
+  std::printf("[ measured ] linearised a chain to %.1e rad; for turns of 1e-4 rad the change to %.1e rad\n",
               worst, worst_change);
   EXPECT_LE(worst, 1e-13);
   EXPECT_LE(worst_change, 1e-9);  // 1e-4 rad times a slope of up to 1e-2 is 1e-6
 }
 
-TEST(Yield, ACurveInPowersIsTheSpline) {
+TEST(JointDeflection, ACurveInPowersIsTheSpline) {
   arms::Random random(33);
   for (const std::size_t size : {6U, 7U, 18U, 128U, 256U}) {
     arms::TermSet<double> set;
     std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
+    for (double& v : c) v = random.linearised(1);
     flexcomp::Term<double>& t = set.add(arms::on_link(1, slot::theta), Basis::curve, 1.0, 0);
     t.table = set.add_curve(c);
     Model<double> model;
     ASSERT_EQ(model.prepare(arms::tx60l(), set.list()), flexcomp::Refusal::none);
     double value = 0, slope = 0, bend = 0;
     for (int n = 0; n < 20000 / part; ++n) {
-      const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.around(30);
-      detail::Local<double> at{0, 0, 0};
-      detail::add_local_curve(model, t, q, 1.0, at);
+      const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.linearised(30);
+      detail::Expansion<double> at{0, 0, 0};
+      detail::expand_curve(model, t, q, 1.0, at);
       const double h = 1e-4 / static_cast<double>(size);
       const double left = arms::curve_value(c, q - h), here = arms::curve_value(c, q),
                    right = arms::curve_value(c, q + h);
@@ -158,7 +158,7 @@ TEST(Yield, ACurveInPowersIsTheSpline) {
   }
 }
 
-TEST(Yield, FirstOrderMotionsAreThoseOfTheChain) {
+TEST(JointDeflection, FirstOrderMotionsAreThoseOfTheChain) {
   arms::Random random(34);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1_geometry(arm, 0.01);
@@ -204,7 +204,7 @@ double left_by(const arms::Robot& robot, const Model<double>& model, arms::Rando
     flexcomp::Context<double, 6> context = flexcomp::default_context<double>(robot);
     for (double& d : context.direction) d = static_cast<double>(random.below(3)) - 1;
     context.temperature_c = random.uniform(10, 40);
-    if (with_force) context.force_n = {random.around(20), random.around(20), random.around(20)};
+    if (with_force) context.force_n = {random.linearised(20), random.linearised(20), random.linearised(20)};
     const flexcomp::Compensated<double, 6> r = flexcomp::compensate(model, q, context);
     if (r.status != flexcomp::StepStatus::ok) continue;
     left = std::max(left, flexcomp::target_residual(model, r.q, q, context).position_m);
@@ -212,19 +212,19 @@ double left_by(const arms::Robot& robot, const Model<double>& model, arms::Rando
   return left;
 }
 
-TEST(Yield, AllKindsOfTermsThatTurnJointsAreTakenOff) {
+TEST(JointDeflection, AllKindsOfTermsThatTurnJointsAreTakenOff) {
   arms::Random random(35);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
     arms::add_joint_curves(set, random, 200e-6, 40);
     for (std::size_t i = 0; i < 6; ++i) {
       const flexcomp::Place own = arms::on_link(i + 1, slot::theta);
-      set.add(own, Basis::sine, random.around(1e-4), i, 2);
-      set.add(own, Basis::cosine, random.around(2e-5), i, 100);
-      set.add(own, Basis::joint_position, random.around(2e-4), i);
-      set.add(own, Basis::direction, random.around(1e-4), i);
-      set.add(own, Basis::sine, random.around(1e-4), (i + 1) % 6, 1);
-      set.add(own, Basis::joint_position, random.around(1e-4), (i + 5) % 6);
+      set.add(own, Basis::sine, random.linearised(1e-4), i, 2);
+      set.add(own, Basis::cosine, random.linearised(2e-5), i, 100);
+      set.add(own, Basis::joint_position, random.linearised(2e-4), i);
+      set.add(own, Basis::direction, random.linearised(1e-4), i);
+      set.add(own, Basis::sine, random.linearised(1e-4), (i + 1) % 6, 1);
+      set.add(own, Basis::joint_position, random.linearised(1e-4), (i + 5) % 6);
     }
     set.add(arms::on_tool(slot::rx), Basis::one, 1e-3);
     set.add(arms::on_tool(slot::z), Basis::one, -1e-3);
@@ -239,7 +239,7 @@ TEST(Yield, AllKindsOfTermsThatTurnJointsAreTakenOff) {
   }
 }
 
-TEST(Yield, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
+TEST(JointDeflection, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
   arms::Random random(36);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
