@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Little-endian bytes and the conversion between binary64 and the target's scalar, without soft-double
-/// arithmetic.
+/// Little-endian integers, and conversion between binary64 and the target's scalar without double arithmetic in software.
 #ifndef FLEXCOMP_BYTES_HPP
 #define FLEXCOMP_BYTES_HPP
 
@@ -12,12 +11,14 @@
 
 namespace flexcomp {
 
+/// Bits of a binary64.
 inline std::uint64_t bits_of(double v) {
   std::uint64_t b;
   std::memcpy(&b, &v, sizeof b);
   return b;
 }
 
+/// Binary64 of these bits.
 inline double double_of(std::uint64_t b) {
   double v;
   std::memcpy(&v, &b, sizeof v);
@@ -86,28 +87,34 @@ inline std::uint64_t to_binary64_bits(S v) {
   }
 }
 
+/// Unsigned integer of 16 bits from little-endian bytes.
 inline std::uint16_t load_u16(const std::uint8_t* p) {
   return static_cast<std::uint16_t>(p[0] | (static_cast<unsigned>(p[1]) << 8U));
 }
 
+/// Unsigned integer of 32 bits from little-endian bytes.
 inline std::uint32_t load_u32(const std::uint8_t* p) {
   return p[0] | (static_cast<std::uint32_t>(p[1]) << 8U) | (static_cast<std::uint32_t>(p[2]) << 16U) |
          (static_cast<std::uint32_t>(p[3]) << 24U);
 }
 
+/// Unsigned integer of 64 bits from little-endian bytes.
 inline std::uint64_t load_u64(const std::uint8_t* p) {
   return load_u32(p) | (static_cast<std::uint64_t>(load_u32(p + 4)) << 32U);
 }
 
+/// Writes an unsigned integer of 16 bits as little-endian bytes.
 inline void store_u16(std::uint8_t* p, std::uint16_t v) {
   p[0] = static_cast<std::uint8_t>(v);
   p[1] = static_cast<std::uint8_t>(v >> 8U);
 }
 
+/// Writes an unsigned integer of 32 bits as little-endian bytes.
 inline void store_u32(std::uint8_t* p, std::uint32_t v) {
   for (unsigned k = 0; k < 4; ++k) p[k] = static_cast<std::uint8_t>(v >> (8U * k));
 }
 
+/// Writes an unsigned integer of 64 bits as little-endian bytes.
 inline void store_u64(std::uint8_t* p, std::uint64_t v) {
   for (unsigned k = 0; k < 8; ++k) p[k] = static_cast<std::uint8_t>(v >> (8U * k));
 }
@@ -123,8 +130,9 @@ inline S load_scalar(const std::uint8_t* p) {
   }
 }
 
-/// True for a value that is neither infinite nor NaN; on the bits, so that -ffast-math cannot remove it.
+/// True for a value that is neither infinite nor NaN; by its bits, so that -ffast-math cannot remove it.
 inline bool is_finite(double v) { return (bits_of(v) & 0x7FF0000000000000ULL) != 0x7FF0000000000000ULL; }
+/// is_finite() of a binary32.
 inline bool is_finite(float v) {
   std::uint32_t b;
   std::memcpy(&b, &v, sizeof b);

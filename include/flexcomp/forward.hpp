@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The rigid-flexible forward model (Chen et al. 2019, Eq. 1 and 10-22, as read in terms on slots).
+/// The rigid-flexible forward model in two passes (docs/model.md, M15; Chen et al. 2019, Eq. 1 and 10-22).
 ///
-/// Torques, levers and moments are taken once, in the chain with the constant geometric and tool terms only;
-/// then all effects are added and the chain is evaluated again. This order is part of the contract: host,
-/// controller and outsiders agree on it to the last bit.
+/// Torques, levers and moments are computed once, in the chain with the constant geometric and tool terms only; then all
+/// effects are added and the chain is evaluated again. Host and controller keep this order to the last bit.
 #ifndef FLEXCOMP_FORWARD_HPP
 #define FLEXCOMP_FORWARD_HPP
 
@@ -25,29 +24,29 @@ namespace flexcomp {
 /// i.
 template <class S, std::size_t N>
 struct Frames {
-  std::array<Matrix3<S>, N + 1> rotation;
-  std::array<Vector3<S>, N + 1> origin;
+  std::array<Matrix3<S>, N + 1> rotation;  ///< columns: axes
+  std::array<Vector3<S>, N + 1> origin;    ///< m
 
+  /// Axis 0, 1, 2 (x, y, z) of a frame.
   Vector3<S> axis(std::size_t frame, int column) const { return rotation[frame].col(column); }
 };
 
-/// What the load does, as one force and one moment about the origin of F0 (the effects' torques follow from
-/// it).
+/// Load (M9) as one force and one moment about the origin of F0.
 template <class S>
 struct Load {
   Vector3<S> force;   ///< N
   Vector3<S> moment;  ///< N·m
 };
 
-/// Values of all slots that effects move, on top of the constant ones; m and rad.
+/// Sum of all effects at each slot (M5), on top of the constant values; m and rad.
 template <class S, std::size_t N>
 struct Slots {
-  std::array<std::array<S, 6>, N> link{};
-  std::array<S, 6> base{};
-  std::array<S, 6> tool{};
-  std::array<S, 3> point{};
+  std::array<std::array<S, 6>, N> link{};  ///< by link and slot
+  std::array<S, 6> base{};                 ///< by slot
+  std::array<S, 6> tool{};                 ///< by slot
+  std::array<S, 3> point{};                ///< by slot
 
-  /// In place: a temporary of this size has no room on a controller's stack.
+  /// Sets all to 0, in place: a temporary of this size does not fit on a controller's stack.
   void clear() {
     for (std::array<S, 6>& values : link) values.fill(S(0));
     base.fill(S(0));
@@ -56,23 +55,23 @@ struct Slots {
   }
 };
 
-/// Scratch of one evaluation. Nothing in it needs to be set by the caller.
+/// Memory of one evaluation, and its intermediate results. The caller sets nothing in it.
 template <class S, std::size_t N = 6>
 struct Workspace {
-  std::array<S, N> q;                  ///< joint readings, rad
-  std::array<SinCos<S>, N> reading;    ///< of q
-  std::array<SinCos<S>, N> angle;      ///< of q + constant offset
-  std::array<SinCos<S>, N> deflected;  ///< of q + constant offset + effects
-  Frames<S, N> frames;                 ///< of the last pass, in F0
-  Load<S> load;
-  Slots<S, N> slots;
+  std::array<S, N> q;                     ///< joint readings, rad
+  std::array<SinCos<S>, N> reading;       ///< of q
+  std::array<SinCos<S>, N> angle;         ///< of q + constant offset
+  std::array<SinCos<S>, N> deflected;     ///< of q + constant offset + effects
+  Frames<S, N> frames;                    ///< of the last pass, in F0
+  Load<S> load;                           ///< of the unloaded pass, in F0
+  Slots<S, N> slots;                      ///< of all effects
   Vector3<S> point = Vector3<S>::Zero();  ///< where effects move the measured point, in Ftool, m
 };
 
 namespace detail {
 
-/// One link: frames[i] -> frames[i + 1]. The products are written out: Rot(z) mixes x and y, Rot(y) x and z,
-/// Rot(x) y and z, so a link costs 30 multiplications instead of 45.
+/// Next frame of the chain by one link (M2). Rot(z), Rot(y) and Rot(x) each mix two columns only, so a link costs 30
+/// multiplications instead of 45.
 template <class S>
 inline void advance(const Matrix3<S>& from, const Vector3<S>& origin, const SinCos<S>& theta, const S& d,
                     const S& a, const SinCos<S>& alpha, const SinCos<S>* beta, const SinCos<S>* gamma,
@@ -97,7 +96,7 @@ inline void advance(const Matrix3<S>& from, const Vector3<S>& origin, const SinC
   }
 }
 
-/// The chain with constant terms only, joint angles in ws.angle.
+/// Chain with constant terms only, C_0 of (M15); joint angles in ws.angle.
 template <class S, std::size_t N, class Cap>
 inline void unloaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
   ws.frames.rotation[0].setIdentity();
@@ -110,7 +109,7 @@ inline void unloaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
   }
 }
 
-/// The chain with all effects in ws.slots.
+/// Chain with all effects (M15) in ws.slots.
 template <class S, std::size_t N, class Cap>
 inline void loaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
   ws.frames.rotation[0].setIdentity();
@@ -137,8 +136,7 @@ inline void loaded_pass(const Model<S, N, Cap>& model, Workspace<S, N>& ws) {
   }
 }
 
-/// Payload weight and external force in the frames of ws (Eq. 10-13; the force Jacobian's detour equals
-/// this).
+/// Load (M8, M9) of payload and external force in the frames of ws.
 template <class S, std::size_t N, class Cap>
 inline void compute_load(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
   const std::array<S, 4>& edit = model.load_edit();
@@ -157,13 +155,13 @@ inline void compute_load(const Model<S, N, Cap>& model, const Context<S, N>& con
   ws.load.moment = cross<S>(at, weight) + cross<S>(tool_at, force);
 }
 
-/// Load moment about a direction through a point, N·m.
+/// Load moment (M10) about a direction through a point, N·m.
 template <class S>
 inline S moment_about(const Load<S>& load, const Vector3<S>& direction, const Vector3<S>& point) {
   return dot<S>(direction, load.moment - cross<S>(point, load.force));
 }
 
-/// Lever of the link's own weight (docs/model.md, M13): z · ((distal - p) × g_hat) / ‖part of (distal - p) perpendicular to
+/// Link-weight lever (M13) from a joint to its distal joint: z · ((distal - p) × g_hat) / ‖part of (distal - p) perpendicular to
 /// z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is under 1 mm.
 template <class S, std::size_t N>
 inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity, std::size_t joint,
@@ -180,7 +178,7 @@ inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity
 
 }  // namespace detail
 
-/// What a term is multiplied by at this pose: the basis φ(q, context). ws.frames and ws.load are those of the
+/// Basis φ(q, context) of a term (M5) that a model accepts, at the pose in ws. ws.frames and ws.load are those of the
 /// unloaded pass where needs_loads(basis, factor) holds.
 template <class S, std::size_t N, class Cap>
 inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
@@ -215,7 +213,7 @@ inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const C
 
 namespace detail {
 
-/// Both passes for the readings in ws.q, ws.reading; leaves the loaded frames in ws.
+/// Forward model (M15) for the readings in ws.q and ws.reading; leaves the loaded frames in ws.
 template <class S, std::size_t N, class Cap>
 inline Pose<S> evaluate(const Model<S, N, Cap>& model, const Context<S, N>& context, Workspace<S, N>& ws) {
   for (std::size_t i = 0; i < N; ++i) ws.angle[i] = compose(ws.reading[i], model.shape(i).offset);
@@ -258,7 +256,7 @@ inline Pose<S> evaluate(const Model<S, N, Cap>& model, const Context<S, N>& cont
   return pose;
 }
 
-/// The nominal chain for given sines and cosines of the readings.
+/// Nominal chain for given sines and cosines of the readings.
 template <class S, std::size_t N, class Cap>
 inline void nominal_pass(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& reading,
                          Frames<S, N>& frames) {
@@ -274,8 +272,9 @@ inline void nominal_pass(const Model<S, N, Cap>& model, const std::array<SinCos<
 
 }  // namespace detail
 
-/// Pose of Ftool in Fb with all terms, for joint readings q (rad). Includes B, but not the frames of a
-/// measurement (F, E); ws.point is where effects move the measured point in Ftool.
+/// Forward model (M1, M15): pose of Ftool in Fb with all terms, for joint readings q (rad). Includes B, but not the frames
+/// F and E of a measurement; ws.point is where effects move the measured point in Ftool. Work: at most two chain passes
+/// and one basis per effect.
 template <class S, std::size_t N, class Cap>
 inline Pose<S> forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad,
                        const Context<S, N>& context, Workspace<S, N>& ws) {
@@ -284,7 +283,7 @@ inline Pose<S> forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   return detail::evaluate(model, context, ws);
 }
 
-/// Pose of Ftool in F0 after the maker's drawing, for joint readings q (rad).
+/// Nominal forward kinematics (M2): pose of Ftool in F0 for joint readings q (rad).
 template <class S, std::size_t N, class Cap>
 inline Pose<S> nominal_forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad) {
   std::array<SinCos<S>, N> reading;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Identification columns (Chen et al. 2019, Eq. 7-9 and 17-23) read from the same terms as the forward
-/// model: column = unit screw of the place, carried to the tool point, times the basis.
+/// Derivatives of the forward model for the coefficients of terms (docs/model.md, section 5).
 ///
-/// Two readings of one list. column() is the paper's H, first order: it leaves out that a geometric error
-/// also shifts torques and levers. exact_column() adds that, and is the true derivative of forward(); the two
-/// differ by (deflection / reach) of the column, see docs/model.md, M19 and M20.
+/// column() is the first-order column of the paper's H (M19): unit screw of the place (M18) times the basis. It leaves
+/// out that a geometric error also shifts torques and levers. exact_column() adds that and is the derivative of forward()
+/// (M20); the two differ by (deflection / reach) of the column.
 #ifndef FLEXCOMP_IDENTIFICATION_HPP
 #define FLEXCOMP_IDENTIFICATION_HPP
 
@@ -16,7 +15,7 @@
 
 namespace flexcomp {
 
-/// Everything that columns need of one pose: the unloaded and the loaded chain, and the pose they lead to.
+/// Both passes of the forward model at one pose (M15), as columns need them.
 template <class S, std::size_t N = 6>
 struct Linearisation {
   Workspace<S, N> unloaded;  ///< frames and load of the pass without effects
@@ -27,11 +26,11 @@ struct Linearisation {
   Matrix3<S> tool_rotation;  ///< Ftool in F0, loaded
 };
 
-/// Unit screw in F0: angular part, and linear part at the point it is asked for.
+/// Unit screw in F0 (M18), at a point.
 template <class S>
 struct Screw {
-  Vector3<S> linear;
-  Vector3<S> angular;
+  Vector3<S> linear;   ///< velocity of that point per unit of the slot
+  Vector3<S> angular;  ///< angular velocity per unit of the slot
 };
 
 namespace detail {
@@ -86,7 +85,7 @@ inline Screw<S> link_screw(const Model<S, N, Cap>& model, const Frames<S, N>& fr
 
 }  // namespace detail
 
-/// Evaluates the model at joint readings q (rad) and keeps what columns need.
+/// Evaluates both passes of the model at joint readings q (rad). Work: three chain passes.
 template <class S, std::size_t N, class Cap>
 inline void linearise(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad,
                       const Context<S, N>& context, Linearisation<S, N>& out) {
@@ -114,9 +113,8 @@ inline void linearise(const Model<S, N, Cap>& model, const std::array<S, N>& q_r
   out.tool_rotation = end.rotation;
 }
 
-/// Unit screw of a place in Fb at the origin of Ftool: how the pose moves per unit of the slot. m and rad;
-/// rows position, then orientation as a rotation vector in Fb (R + dR = exp(w) R). Zero for `load`. For
-/// `point` the translation of the measured point.
+/// Unit screw of a place (M18) at the origin of Ftool, in Fb: motion of the pose per unit of the slot. m and rad; rows of
+/// position, then of orientation (M17). Zero for `load`; for `point` the translation of the measured point.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> screw(const Model<S, N, Cap>& model, const Linearisation<S, N>& at, Place place) {
   Vector6<S> r = Vector6<S>::Zero();
@@ -156,30 +154,33 @@ inline Vector6<S> screw(const Model<S, N, Cap>& model, const Linearisation<S, N>
   return r;
 }
 
-/// Column of H for a term: first order (the paper's). Zero for terms of the load.
+/// First-order column of a term (M19): 6 rows, m and rad per unit of the coefficient. Zero for terms of the load.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at, const Term<S>& term,
                          const Context<S, N>& context) {
   return screw(model, at, term.place) * basis_value(model, term, context, at.unloaded);
 }
 
-/// How the effects of a model answer when a constant slot moves the chain and its load: what exact_column() adds to
-/// column(), for every constant place of one pose.
+/// Derivatives of a model's own effects when a constant slot moves the chain and its load: the sum over e of (M20), for
+/// every constant place of one pose.
 template <class S, std::size_t N = 6>
 struct LoadResponse {
+  /// 6x6 matrix; rows as in (M17).
   using Matrix6 = Eigen::Matrix<S, 6, 6>;
-  bool any = false;          ///< false: no effect follows the load, the rest is not set
-  Vector3<S> com, tool;      ///< payload's centre of mass and origin of Ftool in F0, unloaded
-  Vector3<S> weight, force;  ///< of the payload, and external, N
-  Matrix6 to_load;           ///< change of the pose per change of the load [force; moment about F0]
+  bool any = false;   ///< false: no effect follows the load, the rest is not set
+  Vector3<S> com;     ///< payload's centre of mass in F0, unloaded, m
+  Vector3<S> tool;    ///< origin of Ftool in F0, unloaded, m
+  Vector3<S> weight;  ///< of the payload, N
+  Vector3<S> force;   ///< external, N
+  Matrix6 to_load;    ///< change of the pose per change of the load [force; moment about F0]
   std::array<Matrix6, N>
       to_twist;  ///< [i]: per twist [linear; angular] (about F0) of everything after link i
 };
 
 namespace detail {
 
-/// d value of a basis that needs the load: per change of the load, and per twist of everything behind a link,
-/// which is one vector where only the distal point of a lever moves and another where the whole basis moves.
+/// Derivative of a basis that needs the load (M21): per change of the load, and per twist of everything behind a link.
+/// The latter differs between the whole basis moving and only the distal point of a lever.
 template <class S>
 struct BasisResponse {
   Vector6<S> load = Vector6<S>::Zero();   ///< per [force; moment]
@@ -189,7 +190,7 @@ struct BasisResponse {
   std::size_t distal = 0;
 };
 
-/// Of a moment of the load about a direction that is fixed in a frame, through that frame's origin.
+/// Derivative (M21) of the load moment about a direction fixed in a frame, through a point of it, times a factor.
 template <class S>
 inline void respond_about(const Load<S>& load, const Vector3<S>& direction, const Vector3<S>& point,
                           const S& factor, BasisResponse<S>& out) {
@@ -201,6 +202,7 @@ inline void respond_about(const Load<S>& load, const Vector3<S>& direction, cons
   out.whole << -turned, cross<S>(u, moment) - cross<S>(point, turned);
 }
 
+/// Derivative of the basis of a term, zero where it needs no load.
 template <class S, std::size_t N, class Cap>
 inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term<S>& term,
                                        const Context<S, N>& context, const Workspace<S, N>& ws) {
@@ -267,7 +269,7 @@ inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term
 
 }  // namespace detail
 
-/// The response of all effects at one pose, for exact_column(). Work grows with the effects, not with the columns.
+/// LoadResponse of all effects at one pose, for exact_column(). Work grows with the effects, not with the columns.
 template <class S, std::size_t N, class Cap>
 inline void load_response(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
                           const Context<S, N>& context, LoadResponse<S, N>& out) {
@@ -302,8 +304,7 @@ inline void load_response(const Model<S, N, Cap>& model, const Linearisation<S, 
   }
 }
 
-/// Derivative of forward() for a term's coefficient: column() plus what the constant slot does to torques,
-/// levers and moments of the model's own effects.
+/// Exact column of a term (M20), the derivative of forward() for its coefficient: 6 rows, m and rad per unit.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
                                const LoadResponse<S, N>& response, const Term<S>& term,
@@ -340,7 +341,7 @@ inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisatio
   return r;
 }
 
-/// The same for a single column.
+/// exact_column() of a single term.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> exact_column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
                                const Term<S>& term, const Context<S, N>& context) {

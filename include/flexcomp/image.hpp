@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The parameter image: terms as bytes, bound to one robot. The same bytes travel over every bus and lie in
-/// every slot. All numbers are little-endian, reals are binary64 in SI units.
+/// The parameter image: terms as bytes, bound to one robot; the same on every bus and in every slot of storage. All numbers
+/// are little-endian, reals are binary64 in SI units.
 ///
 ///     header, 96 bytes                                  records, from byte header_bytes
 ///      0  "FLXC"                                         u16 type (bit 15: may be skipped if unknown)
@@ -31,33 +31,35 @@
 
 namespace flexcomp {
 
+/// Constants of the layout; see the table at the top.
 namespace image {
-constexpr std::uint8_t schema_major = 1;
-constexpr std::uint8_t schema_minor = 0;
-constexpr std::size_t header_bytes = 96;
-constexpr std::size_t crc_bytes = 4;
-constexpr std::size_t record_head_bytes = 4;
-constexpr std::size_t term_bytes = 28;
-constexpr std::size_t table_head_bytes = 8;
-constexpr std::size_t max_table_values = 8190;  ///< that a record's 16-bit length can announce
-constexpr std::uint16_t record_term = 1;
-constexpr std::uint16_t record_table = 2;
-constexpr std::uint16_t optional_record = 0x8000;
+constexpr std::uint8_t schema_major = 1;           ///< of what this build writes and reads
+constexpr std::uint8_t schema_minor = 0;           ///< of what this build writes
+constexpr std::size_t header_bytes = 96;           ///< size of the header
+constexpr std::size_t crc_bytes = 4;               ///< size of the CRC-32 at the end
+constexpr std::size_t record_head_bytes = 4;       ///< type and length of a record
+constexpr std::size_t term_bytes = 28;             ///< a term record without its head
+constexpr std::size_t table_head_bytes = 8;        ///< a table record before its values, without its head
+constexpr std::size_t max_table_values = 8190;     ///< limit of a record's 16-bit length
+constexpr std::uint16_t record_term = 1;           ///< type of a term record
+constexpr std::uint16_t record_table = 2;          ///< type of a table record
+constexpr std::uint16_t optional_record = 0x8000;  ///< bit of a type: may be skipped if unknown
 }  // namespace image
 
+/// Header of an image; see the table at the top.
 struct ImageHeader {
-  std::uint8_t schema_major = image::schema_major;
-  std::uint8_t schema_minor = image::schema_minor;
-  std::uint32_t total_bytes = 0;
-  std::uint32_t sequence = 0;
-  Sha256Digest nominal_hash{};
-  Sha256Digest name_hash{};
-  std::uint16_t terms = 0;
-  std::uint16_t tables = 0;
-  std::uint32_t values = 0;
+  std::uint8_t schema_major = image::schema_major;  ///< another one is refused
+  std::uint8_t schema_minor = image::schema_minor;  ///< a higher one only adds
+  std::uint32_t total_bytes = 0;                    ///< header … CRC
+  std::uint32_t sequence = 0;                       ///< a newer set has a higher one
+  Sha256Digest nominal_hash{};                      ///< of the geometry, nominal_hash()
+  Sha256Digest name_hash{};                         ///< of the robot's name, name_hash()
+  std::uint16_t terms = 0;                          ///< number of term records
+  std::uint16_t tables = 0;                         ///< number of table records
+  std::uint32_t values = 0;                         ///< sum of the tables' values
 };
 
-/// Bytes that the image of this list takes.
+/// Size of the image of a list, bytes.
 template <class S>
 inline std::size_t image_size(const TermList<S>& list) {
   std::size_t size = image::header_bytes + image::crc_bytes;
@@ -68,9 +70,8 @@ inline std::size_t image_size(const TermList<S>& list) {
   return size + list.count * (image::record_head_bytes + image::term_bytes);
 }
 
-/// Writes the image of a list into out; returns its size, or 0 where it does not fit, a count
-/// overflows or a table runs out of the list's values.
-/// Of the header only sequence, nominal_hash and name_hash are read.
+/// Writes the image of a list into `out`; returns its size, or 0 where it exceeds `capacity`, a count overflows or a table
+/// exceeds the list's values. Of the header only sequence, nominal_hash and name_hash are read.
 template <class S>
 inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& header, std::uint8_t* out,
                                 std::size_t capacity) {
@@ -134,7 +135,7 @@ inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& head
   return size;
 }
 
-/// Reads and checks the header alone: magic, schema, lengths against `size`. Never reads beyond `size`.
+/// Reads and checks the header alone: magic, schema, lengths against `size`. Reads nothing beyond `size`.
 inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHeader& header) {
   if (size < image::header_bytes + image::crc_bytes) return Refusal::truncated;
   if (bytes[0] != 'F' || bytes[1] != 'L' || bytes[2] != 'X' || bytes[3] != 'C') return Refusal::bad_magic;
@@ -156,7 +157,7 @@ inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHea
   return Refusal::none;
 }
 
-/// Header, checksum and binding: everything that can be said without reading the records.
+/// Checks header, CRC-32 and binding to a robot, without reading the records. Work: ten instructions per byte.
 inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sha256Digest& nominal,
                            const Sha256Digest& name, ImageHeader& header) {
   const Refusal r = read_header(bytes, size, header);
@@ -180,8 +181,8 @@ inline std::uint8_t distal_joint_of(S argument) {
 
 }  // namespace detail
 
-/// Hands each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t*
-/// values)` and `Refusal term(const Term<S>&)`. Stops at the first refusal. Bounded by the size of the image.
+/// Passes each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t* values)` and
+/// `Refusal term(const Term<S>&)`. Ends at the first refusal. Work is linear in the size of the image.
 template <class S, class Visitor>
 inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&& visitor) {
   ImageHeader header;
@@ -247,9 +248,8 @@ inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&
   return Refusal::none;
 }
 
-/// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used.
-/// Effects that belong to the measurement (place `point`, base drift, readout lag) are refused: they are
-/// never pushed.
+/// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used. Effects of the
+/// measurement (place `point`, base drift, readout lag, reflector slip) are refused: they are never pushed.
 template <class S, std::size_t N, class Cap>
 inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, const NominalRobot<N>& robot,
                                 Model<S, N, Cap>& model) {
@@ -259,8 +259,8 @@ inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, con
       return model.add_table_from([values](std::size_t k) { return load_scalar<S>(values + 8 * k); }, t);
     }
     Refusal term(const Term<S>& t) {
-      // By what it does, not only by its name: a clock of the controller's is not the tracker's, and what follows it
-      // would move the arm with nothing in the control cycle to bound the change.
+      // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that follows it
+      // would move the arm without a bound on the change per cycle.
       if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
           t.basis == Basis::relative_speed || t.effect == Effect::base_drift ||
           t.effect == Effect::readout_lag || t.effect == Effect::reflector_slip) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The prepared model: nominal chain + terms, with every constant term folded in once. Build it with begin(),
-/// add_table(), add(), finish(); afterwards it is only read. Evaluation is in forward.hpp.
+/// The prepared model: nominal chain and terms, with the constant terms added up once (docs/model.md, M2, M5). It is built
+/// by begin(), add_table(), add(), finish() and only read afterwards. Evaluation is in forward.hpp.
 #ifndef FLEXCOMP_MODEL_HPP
 #define FLEXCOMP_MODEL_HPP
 
@@ -21,29 +21,28 @@
 
 namespace flexcomp {
 
-/// How much a model holds: terms that are not constant (constant ones cost nothing), tables, and their
-/// values.
+/// Capacity of a model: terms that are not constant (constant ones take no memory), tables, and values of all tables.
 template <std::size_t Terms, std::size_t Tables, std::size_t Values>
 struct Capacity {
-  static constexpr std::size_t terms = Terms;
-  static constexpr std::size_t tables = Tables;
-  static constexpr std::size_t values = Values;
+  static constexpr std::size_t terms = Terms;    ///< that are not constant
+  static constexpr std::size_t tables = Tables;  ///< curves and grids
+  static constexpr std::size_t values = Values;  ///< of all tables
 };
 
-/// Room for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more
-/// effects.
+/// Capacity for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more effects.
 using DefaultCapacity = Capacity<64, 8, 768>;
 
-/// Nominal chain + terms of an arm with N revolute joints, prepared for the scalar S.
+/// Nominal chain and terms of an arm with N revolute joints, prepared for the scalar S. Complete failures: Refusal of
+/// add_table_from() and add().
 template <class S, std::size_t N = 6, class Cap = DefaultCapacity>
 class Model {
  public:
-  using Scalar = S;
-  static constexpr std::size_t joints = N;
+  using Scalar = S;                         ///< of all numbers
+  static constexpr std::size_t joints = N;  ///< revolute
 
-  /// Starts anew with the nominal robot and no terms.
+  /// Resets to the nominal robot without terms.
   void begin(const NominalRobot<N>& robot) {
-    // Member by member: a temporary of this size has no place on a controller's stack.
+    // Member by member: a temporary of this size does not fit on a controller's stack.
     robot_ = robot;
     constant_ = {};
     base_ = {};
@@ -86,8 +85,8 @@ class Model {
     axial_gravity_ = is_zero(g0) && is_zero(g1);
   }
 
-  /// Appends a table; value(k) gives its k-th value, which is copied. Indices count in the order of the
-  /// calls.
+  /// Appends a table; value(k) gives its k-th value, which is copied. Tables are numbered in the order of the calls.
+  /// Refusal: table_too_large, bad_value.
   template <class Value>
   Refusal add_table_from(const Value& value, const Table& table) {
     if (table_count_ >= Cap::tables || value_count_ + table.size > Cap::values)
@@ -119,11 +118,13 @@ class Model {
     return Refusal::none;
   }
 
+  /// add_table_from() of an array.
   Refusal add_table(const Table& table, const S* values) {
     return add_table_from([values](std::size_t k) { return values[k]; }, table);
   }
 
-  /// Appends a term. Tables come before the terms that read them.
+  /// Appends a term. Tables come before the terms that read them. Refusal: bad_place, unknown_basis, bad_value, mounting,
+  /// too_many_terms.
   Refusal add(const Term<S>& term) {
     const Place p = term.place;
     const bool link = p.body >= 1 && p.body <= N;
@@ -136,7 +137,7 @@ class Model {
     if (static_cast<std::uint8_t>(term.factor) > static_cast<std::uint8_t>(Factor::payload))
       return Refusal::bad_value;
     if (term.joint >= N) return Refusal::bad_value;
-    // The load is edited before torques are taken, so its edit cannot depend on the pose.
+    // The payload is changed before torques are computed, so its change cannot depend on the pose.
     if (p.body == body::load && term.basis != Basis::one) return Refusal::bad_place;
     if (term.basis == Basis::thermal && !(link && (p.slot == slot::a || p.slot == slot::d)))
       return Refusal::bad_place;
@@ -176,7 +177,7 @@ class Model {
     return Refusal::none;
   }
 
-  /// Folds the constant terms. Call once after the last add().
+  /// Adds up the constant terms and sorts the effects. Called once, after the last add().
   void finish() {
     for (std::size_t i = 0; i < N; ++i) {
       shape_[i] = nominal_[i];
@@ -194,7 +195,7 @@ class Model {
     compute_twists();
   }
 
-  /// All of a term list at once.
+  /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
   Refusal prepare(const NominalRobot<N>& robot, const TermList<S>& list) {
     begin(robot);
     for (std::size_t k = 0; k < list.table_count; ++k) {
@@ -210,76 +211,83 @@ class Model {
     return Refusal::none;
   }
 
-  const NominalRobot<N>& robot() const { return robot_; }
-  const LinkShape<S>& nominal(std::size_t i) const { return nominal_[i]; }
-  const LinkShape<S>& shape(std::size_t i) const { return shape_[i]; }
-  const Pose<S>& nominal_tool() const { return nominal_tool_; }
-  const Pose<S>& tool_pose() const { return tool_pose_; }
-  const Pose<S>& base_pose() const { return base_pose_; }
-  const std::array<S, 6>& base() const { return base_; }  ///< constant part, m and rad
-  const std::array<S, 6>& tool() const { return tool_; }  ///< constant part, m and rad
-  S lower(std::size_t i) const { return lower_[i]; }      ///< joint limit, rad
-  S upper(std::size_t i) const { return upper_[i]; }      ///< joint limit, rad
-  const Vector3<S>& gravity() const { return gravity_; }  ///< m/s^2, in F0
-  S reference_temperature() const { return reference_temperature_; }
-  const std::array<S, 4>& load_edit() const { return load_edit_; }  ///< kg, m
-  bool has_base() const { return has_base_; }
-  bool base_moves() const { return base_moves_; }
-  bool tool_moves() const { return tool_moves_; }
-  bool needs_loads() const { return needs_loads_; }
+  const NominalRobot<N>& robot() const { return robot_; }                   ///< of begin()
+  const LinkShape<S>& nominal(std::size_t i) const { return nominal_[i]; }  ///< link i (from 0) without terms
+  const LinkShape<S>& shape(std::size_t i) const { return shape_[i]; }  ///< link i with its constant terms
+  const Pose<S>& nominal_tool() const { return nominal_tool_; }         ///< Ftool in F6 without terms
+  const Pose<S>& tool_pose() const { return tool_pose_; }             ///< Ftool in F6 with its constant terms
+  const Pose<S>& base_pose() const { return base_pose_; }             ///< B with its constant terms
+  const std::array<S, 6>& base() const { return base_; }              ///< constant part, m and rad
+  const std::array<S, 6>& tool() const { return tool_; }              ///< constant part, m and rad
+  S lower(std::size_t i) const { return lower_[i]; }                  ///< joint limit, rad
+  S upper(std::size_t i) const { return upper_[i]; }                  ///< joint limit, rad
+  const Vector3<S>& gravity() const { return gravity_; }              ///< m/s^2, in F0
+  S reference_temperature() const { return reference_temperature_; }  ///< deg C
+  const std::array<S, 4>& load_edit() const { return load_edit_; }    ///< kg, m
+  bool has_base() const { return has_base_; }                         ///< B is not 1
+  bool base_moves() const { return base_moves_; }                     ///< some effect acts on B
+  bool tool_moves() const { return tool_moves_; }                     ///< some effect acts on the tool
+  bool needs_loads() const { return needs_loads_; }          ///< some effect needs the unloaded pass (M15)
   bool reads_direction() const { return reads_direction_; }  ///< of the context
-  /// Bits 1 << slot of link i that some effect moves.
+  /// Slots of link i (from 0) that effects act on, as bits 1 << slot.
   std::uint8_t link_moves(std::size_t i) const { return link_moves_[i]; }
-  std::size_t effect_count() const { return effect_count_; }
-  const Term<S>& effect(std::size_t k) const { return effects_[k]; }
-  const Table& table(std::size_t k) const { return tables_[k]; }
-  std::size_t table_count() const { return table_count_; }
+  std::size_t effect_count() const { return effect_count_; }          ///< terms that are not constant
+  const Term<S>& effect(std::size_t k) const { return effects_[k]; }  ///< term k of them
+  const Table& table(std::size_t k) const { return tables_[k]; }      ///< table k
+  std::size_t table_count() const { return table_count_; }            ///< number of tables
+  /// Values of a table.
   const S* values(const Table& table) const { return values_.data() + table.offset; }
 
-  // --- for the control cycle: the effects by what they cost ---------------------------------------------
+  // --- for the control cycle: effects by group (detail/effect_group.hpp) ---------------------------------
 
-  const std::array<LinkShape<S>, N>& nominals() const { return nominal_; }
-  const std::array<LinkShape<S>, N>& shapes() const { return shape_; }
-  /// True where every effect turns a joint (slot theta of a link) by the load's torque, the links' own weight, or
-  /// something that needs no frames. Then the arm is a rigid chain behind yielding joints.
+  const std::array<LinkShape<S>, N>& nominals() const { return nominal_; }  ///< links without terms
+  const std::array<LinkShape<S>, N>& shapes() const { return shape_; }  ///< links with their constant terms
+  /// True where every effect turns a joint (slot theta of a link) by load torque, link weight, or something that needs no
+  /// frames. The arm is then a rigid chain with compliant joints (docs/compensation.md, C2).
   bool has_only_joint_deflections() const { return only_joint_deflections_; }
-  /// True where some effect follows the load's torque or a lever.
+  /// True where some effect follows load torque or link weight.
   bool has_load_deflections() const { return has_load_deflections_; }
-  /// Of link i's theta to the load's torque about its own joint, rad/(N·m); the sum of all such terms.
+  /// Compliance of joint i (from 0) to its own load torque (M12), rad/(N·m); the sum of all such terms.
   S compliance(std::size_t i) const { return compliance_[i]; }
+  /// Number of link-weight terms.
   std::size_t lever_count() const { return group_end_[detail::group::lever]; }
-  /// Link-weight terms, equal levers side by side.
+  /// Link-weight term k; equal levers are adjacent.
   const Term<S>& lever_term(std::size_t k) const { return effects_[order_[k]]; }
+  /// Number of terms of load torque other than compliances.
   std::size_t other_loaded_count() const {
     return group_end_[detail::group::other_loaded] - group_end_[detail::group::lever];
   }
+  /// Term k of them.
   const Term<S>& other_loaded_term(std::size_t k) const {
     return effects_[order_[group_end_[detail::group::lever] + k]];
   }
-  /// Functions of the reading of the very joint that they turn: curves, harmonics, scale.
+  /// Number of terms that are functions of the reading of the joint that they turn: curves, harmonics, scale.
   std::size_t own_count() const {
     return group_end_[detail::group::own] - group_end_[detail::group::other_loaded];
   }
+  /// Term k of them.
   const Term<S>& own_term(std::size_t k) const {
     return effects_[order_[group_end_[detail::group::other_loaded] + k]];
   }
+  /// Number of terms of other readings and of the context.
   std::size_t other_count() const {
     return group_end_[detail::group::other] - group_end_[detail::group::own];
   }
+  /// Term k of them.
   const Term<S>& other_term(std::size_t k) const {
     return effects_[order_[group_end_[detail::group::own] + k]];
   }
   bool has_axial_gravity() const { return axial_gravity_; }  ///< along z of F0
   S inverse_gravity() const { return inverse_gravity_; }     ///< s^2/m; 0 without gravity
-  bool turns_tool() const { return turns_tool_; }
+  bool turns_tool() const { return turns_tool_; }            ///< by constant terms or effects
   /// Nominal tool rotation times the inverse of the one with constant terms.
   const Matrix3<S>& tool_turn() const { return tool_turn_; }
-  /// What the constant terms of link i do, seen from the frame after it and to first order; the last one with what the
-  /// tool's do.
+  /// Motion by the constant terms of link i (from 0), in the frame after it and to first order (C3); the last one includes
+  /// those of the tool.
   const SmallMotion<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
   /// Constant part of the offset of joint i, rad.
   S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }
-  /// What B does, in Fb at its origin.
+  /// Motion by B, in Fb at its origin, to first order (C3).
   const SmallMotion<S>& base_twist() const { return base_twist_; }
 
  private:
@@ -318,7 +326,7 @@ class Model {
       group_end_[g] = static_cast<Count>(n);
     }
     has_load_deflections_ =
-        has_compliance || group_end_[detail::group::other_loaded] != 0;  // the levers are in this end as well
+        has_compliance || group_end_[detail::group::other_loaded] != 0;  // the end includes the levers
     const S g2 = dot<S>(gravity_, gravity_);
     using std::sqrt;
     inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);
@@ -338,7 +346,7 @@ class Model {
       link_twist_[i] = twist_between(link_at_zero(nominal_[i], none),
                                      link_at_zero(shape_[i], sin_cos(constant_[i][slot::theta])));
     }
-    // The tool's motion is seen from the flange, where the last link's is.
+    // The motion of the tool is given in the flange frame, as that of the last link.
     const SmallMotion<S> tool = twist_between(nominal_tool_, tool_pose_);
     const Mat3<S> turned = columns_of(nominal_tool_.rotation);
     const Vec3<S> angular = combine(turned, tool.angular);

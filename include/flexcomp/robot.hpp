@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The nominal robot: what the maker's drawing says. All of it in double on every target (data, not
-/// arithmetic), so that its hash is the same wherever it is taken.
+/// The nominal robot (docs/model.md, section 1) and the context of one instant. The robot is double on every target (data,
+/// not arithmetic), so that its hash is the same everywhere.
 #ifndef FLEXCOMP_ROBOT_HPP
 #define FLEXCOMP_ROBOT_HPP
 
@@ -14,35 +14,36 @@
 
 namespace flexcomp {
 
-/// One nominal link: Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta); theta is added to the joint
-/// reading (Chen et al. 2019, Eq. 1).
+/// One nominal link (M2): Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta); theta is added to the joint reading.
 struct NominalLink {
-  double theta_rad = 0;
-  double d_m = 0;
-  double a_m = 0;
-  double alpha_rad = 0;
-  double beta_rad = 0;
+  double theta_rad = 0;  ///< about z, added to the reading
+  double d_m = 0;        ///< along z
+  double a_m = 0;        ///< along x
+  double alpha_rad = 0;  ///< about x
+  double beta_rad = 0;   ///< about y (Hayati)
 };
 
+/// Range of a joint reading.
 struct JointLimits {
-  double min_rad = -2 * 3.14159265358979323846;
-  double max_rad = 2 * 3.14159265358979323846;
+  double min_rad = -2 * 3.14159265358979323846;  ///< least reading
+  double max_rad = 2 * 3.14159265358979323846;   ///< greatest reading
 };
 
+/// A SHA-256 digest, bytes in order.
 using Sha256Digest = std::array<std::uint8_t, 32>;
 
 /// Nominal geometry, load and limits of an arm with N revolute joints. A plain value: assign the members.
 template <std::size_t N = 6>
 struct NominalRobot {
-  std::array<NominalLink, N> links{};
+  std::array<NominalLink, N> links{};                ///< from the base outward
   std::array<JointLimits, N> limits{};               ///< of the joint readings
   std::array<double, 3> gravity_m_s2{{0, 0, -9.8}};  ///< in F0
   std::array<double, 3> tool_xyz_m{{0, 0, 0}};       ///< origin of Ftool in the flange frame F6
   std::array<double, 4> tool_wxyz{{1, 0, 0, 0}};     ///< Hamilton, maps Ftool to F6, norm 1
   double payload_kg = 0;                             ///< default load where the context names none
   std::array<double, 3> payload_com_m{{0, 0, 0}};    ///< its centre of mass in F6
-  double reference_temperature_c = 20;
-  Sha256Digest name_hash{};  ///< SHA-256 of the robot's name (UTF-8)
+  double reference_temperature_c = 20;               ///< of the nominal lengths
+  Sha256Digest name_hash{};                          ///< SHA-256 of the robot's name (UTF-8)
 };
 
 /// Nominal hash: SHA-256 over "flexcomp-nominal-1", a zero byte, N as one byte, then per link theta, d, a,
@@ -72,20 +73,19 @@ inline Sha256Digest name_hash(const char* name, std::size_t size) {
   return sha.finish();
 }
 
-/// What the joints carry and where the arm comes from, at one instant. Directions and relative speeds are
-/// those of the last motion before the pose.
+/// Context of one instant: load, temperature, time and the last motion before the pose (docs/model.md, section 2).
 template <class S, std::size_t N = 6>
 struct Context {
-  S payload_kg = S(0);
-  std::array<S, 3> payload_com_m{};  ///< in F6
-  std::array<S, 3> force_n{};        ///< external force at the origin of Ftool, in F0
-  S temperature_c = S(20);
-  S time_s = S(0);
+  S payload_kg = S(0);                ///< mass of the payload
+  std::array<S, 3> payload_com_m{};   ///< its centre of mass in F6
+  std::array<S, 3> force_n{};         ///< external force at the origin of Ftool, in F0
+  S temperature_c = S(20);            ///< of the arm
+  S time_s = S(0);                    ///< since the start of the measurement
   std::array<S, N> direction{};       ///< +1, -1, or 0 where unknown
   std::array<S, N> relative_speed{};  ///< u_j = move_j / max_k |move_k|
 };
 
-/// The context of a robot at rest at its reference: default payload, no force, directions unknown.
+/// Context of a robot at rest at its reference: default payload, no force, directions unknown.
 template <class S, std::size_t N>
 inline Context<S, N> default_context(const NominalRobot<N>& robot) {
   Context<S, N> context;

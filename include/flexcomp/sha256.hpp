@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// SHA-256 (FIPS 180-4) without a heap, for the nominal hash: the controller hashes the geometry that it
-/// really runs. Signatures are not made with this; the host uses OpenSSL.
+/// SHA-256 (FIPS 180-4) without a heap, for the nominal hash. Not for signatures: the host uses OpenSSL.
 #ifndef FLEXCOMP_SHA256_HPP
 #define FLEXCOMP_SHA256_HPP
 
@@ -11,15 +10,17 @@
 
 namespace flexcomp {
 
+/// SHA-256 of bytes given one by one. Work: one compression per 64 bytes.
 class Sha256 {
  public:
+  /// Takes the next byte into account.
   // Not inlined: it is called from half a dozen places, each of which would bring its copy into flash.
   [[gnu::noinline]] void update(std::uint8_t byte) {
     block_[size_++ & 63U] = byte;
     if ((size_ & 63U) == 0) compress();
   }
 
-  /// Digest of all bytes so far; the object is spent.
+  /// Digest of all bytes so far; the object must not be used afterwards.
   [[gnu::noinline]] std::array<std::uint8_t, 32> finish() {
     const std::uint64_t bits = size_ * 8U;
     update(0x80);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Outcomes of the core. Every function that can refuse returns one; nothing throws.
+/// Outcomes of the core: every function that can fail returns one; nothing throws.
 #ifndef FLEXCOMP_STATUS_HPP
 #define FLEXCOMP_STATUS_HPP
 
@@ -8,9 +8,9 @@
 
 namespace flexcomp {
 
-/// Why a parameter set, an image or a model was refused. The numbers are on the wire: add, never change.
+/// Reason for which a parameter set, an image or a model was refused. Numbers are on the wire: add, never change.
 enum class Refusal : std::uint8_t {
-  none = 0,
+  none = 0,              ///< accepted
   truncated = 1,         ///< fewer bytes than a header, or than the header announces
   bad_magic = 2,         ///< not a flexcomp image
   schema = 3,            ///< a schema major version that this build does not know
@@ -30,14 +30,15 @@ enum class Refusal : std::uint8_t {
   stale_sequence = 17,   ///< a sequence number not above the active one
 };
 
-/// What became of one joint command. The numbers are on the wire: add, never change.
+/// Result of one joint command (docs/compensation.md, C17). Numbers are on the wire: add, never change.
 enum class StepStatus : std::uint8_t {
-  ok = 0,
-  near_singular = 1,  ///< corrected, but damped near a singularity: orientation is given up before position
-  limited = 2,        ///< the correction was scaled down to the largest allowed one
-  at_limit = 3,       ///< a corrected joint is held at its limit
-  no_set = 4,         ///< no valid parameter set: the command was passed through
-  refused = 5,        ///< the command was not finite or beyond a joint limit: passed through
+  ok = 0,  ///< corrected
+  near_singular =
+      1,  ///< corrected, but damped near a singularity (C9): what remains is orientation before position
+  limited = 2,   ///< the correction was scaled to the largest one allowed
+  at_limit = 3,  ///< a corrected joint is at its limit
+  no_set = 4,    ///< no valid parameter set: the command was passed through
+  refused = 5,   ///< the command was not finite or beyond a joint limit: passed through
 };
 
 /// Lower-case name of a status as in files (`ok near_singular limited at_limit no_set refused`).
@@ -59,7 +60,7 @@ inline const char* name(StepStatus s) {
   return "unknown";
 }
 
-/// One sentence for people, without a full stop.
+/// Message in English, lower case, without a full stop.
 inline const char* text(Refusal r) {
   switch (r) {
     case Refusal::none:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// One sine and cosine for every target, so that host and controller agree to the last bit.
+/// Sine and cosine with the same bits on every target (docs/model.md, M16).
 ///
 /// C libraries differ by up to 16 ulp between x86-64, newlib on Cortex-M and on Cortex-R. Built with
 /// -ffp-contract=off these kernels give the same bits wherever IEEE 754 arithmetic is correctly rounded.
@@ -14,23 +14,27 @@
 
 namespace flexcomp {
 
+/// Ratio of circumference to diameter.
 constexpr double pi = 3.14159265358979323846;
 
 /// The largest angle of sin_cos(), rad: what its range reduction is exact for.
 template <class S>
 struct LargestAngle {
+  /// In double and dual numbers.
   static S value() { return S(1e5); }
 };
+/// The largest angle of sin_cos() in single precision, rad.
 template <>
 struct LargestAngle<float> {
+  /// In single precision.
   static constexpr float value() { return 1e4F; }
 };
 
 /// Sine and cosine of one angle (dimensionless).
 template <class S>
 struct SinCos {
-  S s;
-  S c;
+  S s;  ///< sine
+  S c;  ///< cosine
 };
 
 namespace detail {
