@@ -1,31 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is fixed when the library is built; C and C++. Whoever includes it must see the values with which the
- * library was compiled, so set them for the whole build, not beside one include. */
+/** \file
+ * Settings of the build, for C and C++. Every source must see the values with which the library was compiled:
+ * set them for the whole build, not beside one include. */
 #ifndef FLEXCOMP_CONFIG_H
 #define FLEXCOMP_CONFIG_H
 
-/* double, or float where the processor has single precision only. */
+/** Scalar of the library: double, or float where the processor has single precision only. */
 #ifndef FLEXCOMP_SCALAR
 #define FLEXCOMP_SCALAR double
 #endif
 
-/* How much a parameter set may hold: terms that are not constant (constant ones are free), tables, values. */
+/** Most terms of a parameter set that are not constant (constant ones take no memory). */
 #ifndef FLEXCOMP_TERMS
 #define FLEXCOMP_TERMS 64
 #endif
+/** Most tables of a parameter set. */
 #ifndef FLEXCOMP_TABLES
 #define FLEXCOMP_TABLES 8
 #endif
+/** Most values of all tables of a parameter set. */
 #ifndef FLEXCOMP_TABLE_VALUES
 #define FLEXCOMP_TABLE_VALUES 768
 #endif
 
-/* Longest parameter image, bytes, a multiple of 32. The default holds every table value and 180 terms. */
+/** Longest parameter image, bytes, a multiple of 32. The default holds every table value and 180 terms. */
 #ifndef FLEXCOMP_STAGING_BYTES
 #define FLEXCOMP_STAGING_BYTES 12288
 #endif
 
-/* Non-volatile memory of one of the two slots, bytes: the image and its seal. */
+/** Non-volatile memory of one of the two slots, bytes: the image and its seal. */
 #define FLEXCOMP_SLOT_BYTES (FLEXCOMP_STAGING_BYTES + 32)
 
 #endif

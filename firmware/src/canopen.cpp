@@ -26,7 +26,7 @@ struct Entry {
   std::uint16_t size;
 };
 
-/// The dictionary without what only people need: at compile time, so that no name takes flash.
+/// The dictionary without names, made at compile time so that they take no flash.
 constexpr std::array<Entry, co::object_count> served() {
   std::array<Entry, co::object_count> out{};
   for (std::size_t k = 0; k < co::object_count; ++k) {
@@ -454,7 +454,7 @@ std::uint32_t CanopenNode::get(std::uint32_t& size) {
     case co::robot:
       device_.robot_record(ByteOrder::little, out);
       return co::abort::none;
-    case co::status_for_people: {
+    case co::status_summary: {
       const wire::Status s = device_.status();
       const std::uint32_t values[8] = {7,        s.state,           s.answer, s.refusal,
                                        s.faults, s.active_sequence, s.detail, s.trial_cycles_left};
@@ -480,7 +480,7 @@ std::uint32_t CanopenNode::get(std::uint32_t& size) {
       if (sub_ != 0) return co::abort::none;
       number = 2;
       break;
-    case co::people:
+    case co::corrections:
       number = 7;
       if (sub_ != 0) {
         const float v = device_.correction_deg(sub_ - 1U);

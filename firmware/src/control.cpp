@@ -39,8 +39,8 @@ ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const Contro
   if (settings_.direction_band_rad > Scalar(0)) band_inverse_ = Scalar(2) / settings_.direction_band_rad;
 }
 
-// A joint's direction follows its command like a body with friction that is dragged along (the stop operator
-// of hysteresis): it moves with the command between -1 and +1 and stays at the end that it has reached.
+// Direction of a joint by the stop operator of hysteresis (C18): it moves with the command between -1 and +1
+// and stays at the end that it has reached.
 void ControlCycle::track(const Joints& q) {
   if (!tracking_) {
     last_command_ = q;
@@ -70,7 +70,8 @@ void ControlCycle::track(const Joints& q) {
   }
 }
 
-// What fades or is held must not push a joint beyond a limit that the command itself respects.
+// Joint limits of (C20): a fading or held correction must not move a joint beyond a limit that the command
+// respects.
 Scalar ControlCycle::within_limits(std::size_t joint, Scalar q_command, Scalar q) const {
   const Scalar low = q_command < lower_[joint] ? q_command : lower_[joint];
   const Scalar high = q_command > upper_[joint] ? q_command : upper_[joint];
@@ -151,7 +152,7 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
       const Scalar v = static_cast<Scalar>(fade_left_) * fade_step_;
       const Scalar weight = v * v * (Scalar(3) - Scalar(2) * v);
       for (std::size_t j = 0; j < joints; ++j) {
-        // Where the arm moves on, what is kept comes on top of a correction that is another one by now.
+        // The offset adds to a correction that changes as the arm moves: the sum is limited again (C20).
         const Scalar largest = settings_.compensation.largest_correction_rad;
         const Scalar least = q_command_rad[j] - largest;
         const Scalar most = q_command_rad[j] + largest;

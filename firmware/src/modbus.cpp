@@ -46,7 +46,7 @@ struct BlockPlace {
   bool writable;
 };
 
-/// The map without what only people need: at compile time, so that no name takes flash.
+/// The map without names and texts, made at compile time so that they take no flash.
 constexpr std::array<BlockPlace, map::block_count> served() {
   std::array<BlockPlace, map::block_count> out{};
   for (std::size_t k = 0; k < map::block_count; ++k) {
@@ -149,8 +149,8 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
       case Block::probe_response:
         from = probe_response_.data();
         break;
-      case Block::people:
-        for (std::size_t k = 0; k < map::people_registers / 2; ++k) {
+      case Block::corrections:
+        for (std::size_t k = 0; k < map::corrections_registers / 2; ++k) {
           const float v = device_.correction_deg(k);
           std::uint32_t bits;
           std::memcpy(&bits, &v, sizeof bits);
@@ -216,7 +216,7 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, con
     case Block::status:
     case Block::reading_window:
     case Block::probe_response:
-    case Block::people:
+    case Block::corrections:
     case Block::robot:
       break;
   }

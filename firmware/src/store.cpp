@@ -32,8 +32,8 @@ Scalar spread(std::uint32_t pose, std::size_t joint) {
   return static_cast<Scalar>((pose * step[joint]) >> 8U) * Scalar(1.0F / 16777216.0F);
 }
 
-/// The first basis that this controller does not evaluate, in an image whose records are in order up to there. A walk
-/// over the heads alone: to visit the whole image a second time would bring its reader into flash twice.
+/// The first basis that this controller does not evaluate, in an image whose records are valid up to there.
+/// It reads the heads of the records only: a second instance of visit_image() would take flash.
 std::uint32_t unknown_basis(const std::uint8_t* bytes, std::uint32_t size) {
   constexpr std::size_t head = image::record_head_bytes;
   for (std::size_t at = image::header_bytes; at + head + image::term_bytes <= size;
@@ -188,12 +188,12 @@ bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
       context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
       context.relative_speed[j] = context.direction[j];
     }
-    const Miss change = missed(model, q, q, context);
+    const TargetResidual<Scalar> change = remaining_error(model, q, q, context);
     if (!(change.position_m <= settings_.plausible_position_m)) {
       detail = micro(change.position_m);
       return false;
     }
-    if (change.beyond_a_right_angle || !(change.orientation_rad <= settings_.plausible_orientation_rad)) {
+    if (change.is_beyond_right_angle || !(change.orientation_rad <= settings_.plausible_orientation_rad)) {
       detail = micro(change.orientation_rad);
       return false;
     }
@@ -413,10 +413,10 @@ void Store::fail() {
   finish(Answer::storage_failed);
 }
 
-/// Takes note of a trial that ran out in the cycle.
+/// Records that a trial has run out in the cycle.
 void Store::watch_trial() {
   if (state_ != StoreState::trial || !sets_.handover.settled() || !sets_.handover.reverted()) return;
-  // The cycle has changed over by itself, so there is nothing to post.
+  // The cycle has reverted by itself: there is no request to post.
   active_ = previous_;
   previous_ = Set{};
   if (active_.index == Handover::none) faults_ |= wire::fault::no_valid_set;

@@ -220,7 +220,7 @@ std::vector<Field> fields_of(map::Block block) {
       fields.push_back({"name", "bytes", wire::robot_name_bytes, ""});
       return fields;
     }
-    case Block::people: {
+    case Block::corrections: {
       std::vector<Field> fields;
       for (std::size_t j = 1; j <= wire::joints; ++j)
         fields.push_back({fmt::format("correction{}", j), "f32", 4, "deg"});

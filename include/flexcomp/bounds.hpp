@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Settings and bounds of a corrected command: finiteness, largest correction, joint limits (docs/compensation.md, C10,
-/// C17, C20). The core and the control cycle share them.
+/// Settings and bounds of a corrected command: finiteness, largest correction, joint limits
+/// (docs/compensation.md, C10, C17, C20). The core and the control cycle share them.
 #ifndef FLEXCOMP_BOUNDS_HPP
 #define FLEXCOMP_BOUNDS_HPP
 
@@ -12,13 +12,13 @@
 
 namespace flexcomp {
 
-/// Settings of the compensation (docs/compensation.md, section 1). The defaults suit arms of 0.3 to 4 m with errors below
-/// 20 mm.
+/// Settings of the compensation (docs/compensation.md, section 1). The defaults suit arms of 0.3 to 4 m with
+/// errors below 20 mm.
 template <class S>
 struct CompensationSettings {
   S largest_correction_rad = S(0.1);  ///< of any joint; a larger correction is scaled as a whole (C10, C17)
-  /// Threshold of kappa^(1/2) below which damping sets in (C9): m/rad for position, 1 for orientation. An arm whose
-  /// Jacobian has a smallest singular value of 0.1 (lengths in m) is never below 0.1/sqrt(3).
+  /// Threshold of kappa^(1/2) below which damping sets in (C9): m/rad for position, 1 for orientation. An arm
+  /// whose Jacobian has a smallest singular value of 0.1 (lengths in m) is never below 0.1/sqrt(3).
   S singular_below = S(0.05);
   S damping = S(0.1);  ///< at the singularity itself (C9)
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Little-endian integers, and conversion between binary64 and the target's scalar without double arithmetic in software.
+/// Little-endian integers, and conversion between binary64 and the target's scalar without double arithmetic
+/// in software.
 #ifndef FLEXCOMP_BYTES_HPP
 #define FLEXCOMP_BYTES_HPP
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Inverse compensation (docs/compensation.md): the joint command that brings the flexible arm to the nominal pose of the
-/// command.
+/// Inverse compensation (docs/compensation.md): the joint command that brings the flexible arm to the nominal
+/// pose of the command.
 ///
-/// A set whose effects all turn joints (Model::has_only_joint_deflections(); every set of the paper's model) takes the
-/// joint-only path: rigid inverse kinematics first, then the deflections. All other sets take the general path, three
-/// corrections with the forward model. Work is bounded on any input. Near a singularity the error that remains is in the
-/// orientation (detail/damped_jacobian_solver.hpp).
+/// A set whose effects all turn joints (Model::has_only_joint_deflections(); every set of the paper's model)
+/// takes the joint-only path: rigid inverse kinematics first, then the deflections. All other sets take the
+/// general path, three corrections with the forward model. Work is bounded on any input. Near a singularity
+/// the error that remains is in the orientation (detail/damped_jacobian_solver.hpp).
 ///
-/// The correction is continuous in the command but for what one step more or less of an iteration changes: 1e-9 rad where
-/// the arm is regular. core_compensation_test bounds its slope through the singularities.
+/// The correction is continuous in the command but for what one step more or less of an iteration changes:
+/// 1e-9 rad where the arm is regular. core_compensation_test bounds its slope through the singularities.
 #ifndef FLEXCOMP_COMPENSATE_HPP
 #define FLEXCOMP_COMPENSATE_HPP
 
@@ -51,14 +51,14 @@ inline bool is_finite_context(const Context<S, N>& c) {
 
 }  // namespace detail
 
-/// Inverse compensation (C1): the joint command `out.q` (rad) at which the arm with all its terms has the pose that the
-/// nominal arm has at q_command (rad).
+/// Inverse compensation (C1): the joint command `out.q` (rad) at which the arm with all its terms has the
+/// pose that the nominal arm has at q_command (rad).
 ///
-/// The result is a pure function of the arguments; work is bounded on any input (section 9 of docs/compensation.md).
-/// Refused (command passed through): a command that is not finite or lies beyond a joint limit, a context that is not
-/// finite, and effects that grow beyond all bounds (a change of more than 1e4 rad, an overflow). Otherwise the result is
-/// finite, within the joint limits, and no joint differs from its command by more than settings.largest_correction_rad
-/// (C17).
+/// The result is a pure function of the arguments; work is bounded on any input (section 9 of
+/// docs/compensation.md). Refused (command passed through): a command that is not finite or lies beyond a
+/// joint limit, a context that is not finite, and effects that grow beyond all bounds (a change of more than
+/// 1e4 rad, an overflow). Otherwise the result is finite, within the joint limits, and no joint differs from
+/// its command by more than settings.largest_correction_rad (C17).
 template <class S, std::size_t N, class Cap>
 inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
                        const Context<S, N>& context, const CompensationSettings<S>& settings,
@@ -126,12 +126,13 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
 /// Remaining error of a pose: target minus what the forward model gives.
 template <class S>
 struct TargetResidual {
-  S position_m = S(0);       ///< 3-D distance
-  S orientation_rad = S(0);  ///< sine of the angle, which is the angle to third order
+  S position_m = S(0);                 ///< 3-D distance
+  S orientation_rad = S(0);            ///< sine of the angle, which is the angle to third order
+  bool is_beyond_right_angle = false;  ///< of the angle: its sine decreases again
 };
 
-/// Remaining error at the command q (rad): forward model (M15) against the nominal pose at q_command (rad). Work: two
-/// evaluations of the chain.
+/// Remaining error at the command q (rad): forward model (M15) against the nominal pose at q_command (rad).
+/// Work: two evaluations of the chain.
 template <class S, std::size_t N, class Cap>
 inline TargetResidual<S> target_residual(const Model<S, N, Cap>& model, const std::array<S, N>& q,
                                          const std::array<S, N>& q_command, const Context<S, N>& context) {
@@ -141,8 +142,11 @@ inline TargetResidual<S> target_residual(const Model<S, N, Cap>& model, const st
   const Vector3<S> p = target.position - pose.position;
   Vec3<S> r;
   detail::rotation_error(columns_of(target.rotation), columns_of(pose.rotation), r);
+  const S trace = dot<S>(target.rotation.col(0), pose.rotation.col(0)) +
+                  dot<S>(target.rotation.col(1), pose.rotation.col(1)) +
+                  dot<S>(target.rotation.col(2), pose.rotation.col(2));
   using std::sqrt;
-  return {sqrt(dot<S>(p, p)), sqrt(dot(r, r))};
+  return {sqrt(dot<S>(p, p)), sqrt(dot(r, r)), !(trace > S(1))};
 }
 
 }  // namespace flexcomp

@@ -2,8 +2,9 @@
 /// \file
 /// The rigid-flexible forward model in two passes (docs/model.md, M15; Chen et al. 2019, Eq. 1 and 10-22).
 ///
-/// Torques, levers and moments are computed once, in the chain with the constant geometric and tool terms only; then all
-/// effects are added and the chain is evaluated again. Host and controller keep this order to the last bit.
+/// Torques, levers and moments are computed once, in the chain with the constant geometric and tool terms
+/// only; then all effects are added and the chain is evaluated again. Host and controller keep this order to
+/// the last bit.
 #ifndef FLEXCOMP_FORWARD_HPP
 #define FLEXCOMP_FORWARD_HPP
 
@@ -70,8 +71,8 @@ struct Workspace {
 
 namespace detail {
 
-/// Next frame of the chain by one link (M2). Rot(z), Rot(y) and Rot(x) each mix two columns only, so a link costs 30
-/// multiplications instead of 45.
+/// Next frame of the chain by one link (M2). Rot(z), Rot(y) and Rot(x) each mix two columns only, so a link
+/// costs 30 multiplications instead of 45.
 template <class S>
 inline void advance(const Matrix3<S>& from, const Vector3<S>& origin, const SinCos<S>& theta, const S& d,
                     const S& a, const SinCos<S>& alpha, const SinCos<S>* beta, const SinCos<S>* gamma,
@@ -161,8 +162,9 @@ inline S moment_about(const Load<S>& load, const Vector3<S>& direction, const Ve
   return dot<S>(direction, load.moment - cross<S>(point, load.force));
 }
 
-/// Link-weight lever (M13) from a joint to its distal joint: z · ((distal - p) × g_hat) / ‖part of (distal - p) perpendicular to
-/// z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is under 1 mm.
+/// Link-weight lever (M13) from a joint to its distal joint: z · ((distal - p) × g_hat) / ‖part of (distal -
+/// p) perpendicular to z‖; on the TX60L exactly sin q2 and sin(q2 + q3). Zero where the perpendicular part is
+/// under 1 mm.
 template <class S, std::size_t N>
 inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity, std::size_t joint,
                            std::size_t distal) {
@@ -178,8 +180,8 @@ inline S link_weight_lever(const Frames<S, N>& frames, const Vector3<S>& gravity
 
 }  // namespace detail
 
-/// Basis φ(q, context) of a term (M5) that a model accepts, at the pose in ws. ws.frames and ws.load are those of the
-/// unloaded pass where needs_loads(basis, factor) holds.
+/// Basis φ(q, context) of a term (M5) that a model accepts, at the pose in ws. ws.frames and ws.load are
+/// those of the unloaded pass where needs_loads(basis, factor) holds.
 template <class S, std::size_t N, class Cap>
 inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
                      const Workspace<S, N>& ws) {
@@ -272,9 +274,9 @@ inline void nominal_pass(const Model<S, N, Cap>& model, const std::array<SinCos<
 
 }  // namespace detail
 
-/// Forward model (M1, M15): pose of Ftool in Fb with all terms, for joint readings q (rad). Includes B, but not the frames
-/// F and E of a measurement; ws.point is where effects move the measured point in Ftool. Work: at most two chain passes
-/// and one basis per effect.
+/// Forward model (M1, M15): pose of Ftool in Fb with all terms, for joint readings q (rad). Includes B, but
+/// not the frames F and E of a measurement; ws.point is where effects move the measured point in Ftool. Work:
+/// at most two chain passes and one basis per effect.
 template <class S, std::size_t N, class Cap>
 inline Pose<S> forward(const Model<S, N, Cap>& model, const std::array<S, N>& q_rad,
                        const Context<S, N>& context, Workspace<S, N>& ws) {

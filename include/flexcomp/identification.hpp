@@ -2,9 +2,9 @@
 /// \file
 /// Derivatives of the forward model for the coefficients of terms (docs/model.md, section 5).
 ///
-/// column() is the first-order column of the paper's H (M19): unit screw of the place (M18) times the basis. It leaves
-/// out that a geometric error also shifts torques and levers. exact_column() adds that and is the derivative of forward()
-/// (M20); the two differ by (deflection / reach) of the column.
+/// column() is the first-order column of the paper's H (M19): unit screw of the place (M18) times the basis.
+/// It leaves out that a geometric error also shifts torques and levers. exact_column() adds that and is the
+/// derivative of forward() (M20); the two differ by (deflection / reach) of the column.
 #ifndef FLEXCOMP_IDENTIFICATION_HPP
 #define FLEXCOMP_IDENTIFICATION_HPP
 
@@ -113,8 +113,9 @@ inline void linearise(const Model<S, N, Cap>& model, const std::array<S, N>& q_r
   out.tool_rotation = end.rotation;
 }
 
-/// Unit screw of a place (M18) at the origin of Ftool, in Fb: motion of the pose per unit of the slot. m and rad; rows of
-/// position, then of orientation (M17). Zero for `load`; for `point` the translation of the measured point.
+/// Unit screw of a place (M18) at the origin of Ftool, in Fb: motion of the pose per unit of the slot. m and
+/// rad; rows of position, then of orientation (M17). Zero for `load`; for `point` the translation of the
+/// measured point.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> screw(const Model<S, N, Cap>& model, const Linearisation<S, N>& at, Place place) {
   Vector6<S> r = Vector6<S>::Zero();
@@ -154,15 +155,16 @@ inline Vector6<S> screw(const Model<S, N, Cap>& model, const Linearisation<S, N>
   return r;
 }
 
-/// First-order column of a term (M19): 6 rows, m and rad per unit of the coefficient. Zero for terms of the load.
+/// First-order column of a term (M19): 6 rows, m and rad per unit of the coefficient. Zero for terms of the
+/// load.
 template <class S, std::size_t N, class Cap>
 inline Vector6<S> column(const Model<S, N, Cap>& model, const Linearisation<S, N>& at, const Term<S>& term,
                          const Context<S, N>& context) {
   return screw(model, at, term.place) * basis_value(model, term, context, at.unloaded);
 }
 
-/// Derivatives of a model's own effects when a constant slot moves the chain and its load: the sum over e of (M20), for
-/// every constant place of one pose.
+/// Derivatives of a model's own effects when a constant slot moves the chain and its load: the sum over e of
+/// (M20), for every constant place of one pose.
 template <class S, std::size_t N = 6>
 struct LoadResponse {
   /// 6x6 matrix; rows as in (M17).
@@ -179,8 +181,8 @@ struct LoadResponse {
 
 namespace detail {
 
-/// Derivative of a basis that needs the load (M21): per change of the load, and per twist of everything behind a link.
-/// The latter differs between the whole basis moving and only the distal point of a lever.
+/// Derivative of a basis that needs the load (M21): per change of the load, and per twist of everything
+/// behind a link. The latter differs between the whole basis moving and only the distal point of a lever.
 template <class S>
 struct BasisResponse {
   Vector6<S> load = Vector6<S>::Zero();   ///< per [force; moment]
@@ -190,7 +192,8 @@ struct BasisResponse {
   std::size_t distal = 0;
 };
 
-/// Derivative (M21) of the load moment about a direction fixed in a frame, through a point of it, times a factor.
+/// Derivative (M21) of the load moment about a direction fixed in a frame, through a point of it, times a
+/// factor.
 template <class S>
 inline void respond_about(const Load<S>& load, const Vector3<S>& direction, const Vector3<S>& point,
                           const S& factor, BasisResponse<S>& out) {
@@ -269,7 +272,8 @@ inline BasisResponse<S> basis_response(const Model<S, N, Cap>& model, const Term
 
 }  // namespace detail
 
-/// LoadResponse of all effects at one pose, for exact_column(). Work grows with the effects, not with the columns.
+/// LoadResponse of all effects at one pose, for exact_column(). Work grows with the effects, not with the
+/// columns.
 template <class S, std::size_t N, class Cap>
 inline void load_response(const Model<S, N, Cap>& model, const Linearisation<S, N>& at,
                           const Context<S, N>& context, LoadResponse<S, N>& out) {

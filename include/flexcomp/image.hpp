@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The parameter image: terms as bytes, bound to one robot; the same on every bus and in every slot of storage. All numbers
-/// are little-endian, reals are binary64 in SI units.
+/// The parameter image: terms as bytes, bound to one robot; the same on every bus and in every slot of
+/// storage. All numbers are little-endian, reals are binary64 in SI units.
 ///
 ///     header, 96 bytes                                  records, from byte header_bytes
 ///      0  "FLXC"                                         u16 type (bit 15: may be skipped if unknown)
@@ -12,10 +12,13 @@
 ///     16  nominal hash, 32 bytes                            f64 argument, f64 coefficient
 ///     48  SHA-256 of the robot's name, 32 bytes          type 2, table, 8 + 8 n bytes (curve: rows 0):
 ///     80  u16 terms, u16 tables                             u16 rows, u16 columns
-///     84  u32 table values                                  u8 row covariate, row joint, column covariate,
-///     column joint 88  u32 flags (0), u32 0                              f64 values (term.hpp, Table)
+///     84  u32 table values                                  u8 row covariate, u8 row joint,
+///     88  u32 flags (0), u32 0                              u8 column covariate, u8 column joint
+///                                                           f64 values (term.hpp, Table)
 ///                                                        tables come before terms
 ///     last 4 bytes: CRC-32 (IEEE 802.3) of all before
+///
+/// The argument of a link-weight term is the number of its distal joint, from 0.
 #ifndef FLEXCOMP_IMAGE_HPP
 #define FLEXCOMP_IMAGE_HPP
 
@@ -70,8 +73,9 @@ inline std::size_t image_size(const TermList<S>& list) {
   return size + list.count * (image::record_head_bytes + image::term_bytes);
 }
 
-/// Writes the image of a list into `out`; returns its size, or 0 where it exceeds `capacity`, a count overflows or a table
-/// exceeds the list's values. Of the header only sequence, nominal_hash and name_hash are read.
+/// Writes the image of a list into `out`; returns its size, or 0 where it exceeds `capacity`, a count
+/// overflows or a table exceeds the list's values. Of the header only sequence, nominal_hash and name_hash
+/// are read.
 template <class S>
 inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& header, std::uint8_t* out,
                                 std::size_t capacity) {
@@ -157,7 +161,8 @@ inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHea
   return Refusal::none;
 }
 
-/// Checks header, CRC-32 and binding to a robot, without reading the records. Work: ten instructions per byte.
+/// Checks header, CRC-32 and binding to a robot, without reading the records. Work: ten instructions per
+/// byte.
 inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sha256Digest& nominal,
                            const Sha256Digest& name, ImageHeader& header) {
   const Refusal r = read_header(bytes, size, header);
@@ -181,8 +186,9 @@ inline std::uint8_t distal_joint_of(S argument) {
 
 }  // namespace detail
 
-/// Passes each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t* values)` and
-/// `Refusal term(const Term<S>&)`. Ends at the first refusal. Work is linear in the size of the image.
+/// Passes each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t*
+/// values)` and `Refusal term(const Term<S>&)`. Ends at the first refusal. Work is linear in the size of the
+/// image.
 template <class S, class Visitor>
 inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&& visitor) {
   ImageHeader header;
@@ -248,8 +254,9 @@ inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&
   return Refusal::none;
 }
 
-/// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used. Effects of the
-/// measurement (place `point`, base drift, readout lag, reflector slip) are refused: they are never pushed.
+/// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used.
+/// Effects of the measurement (place `point`, base drift, readout lag, reflector slip) are refused: they are
+/// never pushed.
 template <class S, std::size_t N, class Cap>
 inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, const NominalRobot<N>& robot,
                                 Model<S, N, Cap>& model) {
@@ -259,8 +266,8 @@ inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, con
       return model.add_table_from([values](std::size_t k) { return load_scalar<S>(values + 8 * k); }, t);
     }
     Refusal term(const Term<S>& t) {
-      // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that follows it
-      // would move the arm without a bound on the change per cycle.
+      // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that
+      // follows it would move the arm without a bound on the change per cycle.
       if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
           t.basis == Basis::relative_speed || t.effect == Effect::base_drift ||
           t.effect == Effect::readout_lag || t.effect == Effect::reflector_slip) {

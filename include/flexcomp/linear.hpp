@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Fixed-size vectors, rotations and poses, without heap. Eigen types for the forward model; plain scalars (Vec3, Mat3)
-/// for the kernels of the control cycle.
+/// Fixed-size vectors, rotations and poses, without heap. Eigen types for the forward model; plain scalars
+/// (Vec3, Mat3) for the kernels of the control cycle.
 #ifndef FLEXCOMP_LINEAR_HPP
 #define FLEXCOMP_LINEAR_HPP
 
-// A failed assertion of Eigen's is a fault of this library. On a controller it ends in the firmware's own fault
-// hook, `extern "C" void FLEXCOMP_FAULT()`, which must not return; the C library's assert would print, and bring a
-// heap to do so. FLEXCOMP_FAULT names the function and must be the same in every source of a program, as Eigen's
-// templates are. Where it is not defined (on a host) assert() is left as it is.
+// A failed assertion of Eigen's is a fault of this library. On a controller it ends in the firmware's own
+// fault hook, `extern "C" void FLEXCOMP_FAULT()`, which must not return; the C library's assert would print,
+// and bring a heap to do so. FLEXCOMP_FAULT names the function and must be the same in every source of a
+// program, as Eigen's templates are. Where it is not defined (on a host) assert() is left as it is.
 #ifdef FLEXCOMP_FAULT
 #ifdef EIGEN_CORE_H
 #error "include flexcomp before Eigen: FLEXCOMP_FAULT must reach all of Eigen in a program"
@@ -65,7 +65,8 @@ inline Pose<S> operator*(const Pose<S>& outer, const Pose<S>& inner) {
   return r;
 }
 
-/// Column of 3 as plain scalars, which stay in registers where an expression template would go through memory.
+/// Column of 3 as plain scalars, which stay in registers where an expression template would go through
+/// memory.
 template <class S>
 struct Vec3 {
   S x;  ///< first

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The prepared model: nominal chain and terms, with the constant terms added up once (docs/model.md, M2, M5). It is built
-/// by begin(), add_table(), add(), finish() and only read afterwards. Evaluation is in forward.hpp.
+/// The prepared model: nominal chain and terms, with the constant terms added up once (docs/model.md, M2,
+/// M5). It is built by begin(), add_table(), add(), finish() and only read afterwards. Evaluation is in
+/// forward.hpp.
 #ifndef FLEXCOMP_MODEL_HPP
 #define FLEXCOMP_MODEL_HPP
 
@@ -21,7 +22,8 @@
 
 namespace flexcomp {
 
-/// Capacity of a model: terms that are not constant (constant ones take no memory), tables, and values of all tables.
+/// Capacity of a model: terms that are not constant (constant ones take no memory), tables, and values of all
+/// tables.
 template <std::size_t Terms, std::size_t Tables, std::size_t Values>
 struct Capacity {
   static constexpr std::size_t terms = Terms;    ///< that are not constant
@@ -29,11 +31,12 @@ struct Capacity {
   static constexpr std::size_t values = Values;  ///< of all tables
 };
 
-/// Capacity for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more effects.
+/// Capacity for the paper's nine flexible terms, a curve of 128 values on each of six joints, and 50 more
+/// effects.
 using DefaultCapacity = Capacity<64, 8, 768>;
 
-/// Nominal chain and terms of an arm with N revolute joints, prepared for the scalar S. Complete failures: Refusal of
-/// add_table_from() and add().
+/// Nominal chain and terms of an arm with N revolute joints, prepared for the scalar S. Complete failures:
+/// Refusal of add_table_from() and add().
 template <class S, std::size_t N = 6, class Cap = DefaultCapacity>
 class Model {
  public:
@@ -85,8 +88,8 @@ class Model {
     axial_gravity_ = is_zero(g0) && is_zero(g1);
   }
 
-  /// Appends a table; value(k) gives its k-th value, which is copied. Tables are numbered in the order of the calls.
-  /// Refusal: table_too_large, bad_value.
+  /// Appends a table; value(k) gives its k-th value, which is copied. Tables are numbered in the order of the
+  /// calls. Refusal: table_too_large, bad_value.
   template <class Value>
   Refusal add_table_from(const Value& value, const Table& table) {
     if (table_count_ >= Cap::tables || value_count_ + table.size > Cap::values)
@@ -123,8 +126,8 @@ class Model {
     return add_table_from([values](std::size_t k) { return values[k]; }, table);
   }
 
-  /// Appends a term. Tables come before the terms that read them. Refusal: bad_place, unknown_basis, bad_value, mounting,
-  /// too_many_terms.
+  /// Appends a term. Tables come before the terms that read them. Refusal: bad_place, unknown_basis,
+  /// bad_value, mounting, too_many_terms.
   Refusal add(const Term<S>& term) {
     const Place p = term.place;
     const bool link = p.body >= 1 && p.body <= N;
@@ -242,8 +245,8 @@ class Model {
 
   const std::array<LinkShape<S>, N>& nominals() const { return nominal_; }  ///< links without terms
   const std::array<LinkShape<S>, N>& shapes() const { return shape_; }  ///< links with their constant terms
-  /// True where every effect turns a joint (slot theta of a link) by load torque, link weight, or something that needs no
-  /// frames. The arm is then a rigid chain with compliant joints (docs/compensation.md, C2).
+  /// True where every effect turns a joint (slot theta of a link) by load torque, link weight, or something
+  /// that needs no frames. The arm is then a rigid chain with compliant joints (docs/compensation.md, C2).
   bool has_only_joint_deflections() const { return only_joint_deflections_; }
   /// True where some effect follows load torque or link weight.
   bool has_load_deflections() const { return has_load_deflections_; }
@@ -282,8 +285,8 @@ class Model {
   bool turns_tool() const { return turns_tool_; }            ///< by constant terms or effects
   /// Nominal tool rotation times the inverse of the one with constant terms.
   const Matrix3<S>& tool_turn() const { return tool_turn_; }
-  /// Motion by the constant terms of link i (from 0), in the frame after it and to first order (C3); the last one includes
-  /// those of the tool.
+  /// Motion by the constant terms of link i (from 0), in the frame after it and to first order (C3); the last
+  /// one includes those of the tool.
   const SmallMotion<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
   /// Constant part of the offset of joint i, rad.
   S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The nominal robot (docs/model.md, section 1) and the context of one instant. The robot is double on every target (data,
-/// not arithmetic), so that its hash is the same everywhere.
+/// The nominal robot (docs/model.md, section 1) and the context of one instant. The robot is double on every
+/// target (data, not arithmetic), so that its hash is the same everywhere.
 #ifndef FLEXCOMP_ROBOT_HPP
 #define FLEXCOMP_ROBOT_HPP
 
@@ -14,7 +14,8 @@
 
 namespace flexcomp {
 
-/// One nominal link (M2): Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta); theta is added to the joint reading.
+/// One nominal link (M2): Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta); theta is added to the
+/// joint reading.
 struct NominalLink {
   double theta_rad = 0;  ///< about z, added to the reading
   double d_m = 0;        ///< along z
@@ -73,7 +74,8 @@ inline Sha256Digest name_hash(const char* name, std::size_t size) {
   return sha.finish();
 }
 
-/// Context of one instant: load, temperature, time and the last motion before the pose (docs/model.md, section 2).
+/// Context of one instant: load, temperature, time and the last motion before the pose (docs/model.md,
+/// section 2).
 template <class S, std::size_t N = 6>
 struct Context {
   S payload_kg = S(0);                ///< mass of the payload

@@ -8,7 +8,8 @@
 
 namespace flexcomp {
 
-/// Reason for which a parameter set, an image or a model was refused. Numbers are on the wire: add, never change.
+/// Reason for which a parameter set, an image or a model was refused. Numbers are on the wire: add, never
+/// change.
 enum class Refusal : std::uint8_t {
   none = 0,              ///< accepted
   truncated = 1,         ///< fewer bytes than a header, or than the header announces

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Terms (docs/model.md, M5): value of a slot = nominal + sum of coefficient x basis. A term is a place in the chain, a
-/// basis it is proportional to, and a coefficient.
+/// Terms (docs/model.md, M5): value of a slot = nominal + sum of coefficient x basis. A term is a place in
+/// the chain, a basis it is proportional to, and a coefficient.
 #ifndef FLEXCOMP_TERM_HPP
 #define FLEXCOMP_TERM_HPP
 
@@ -20,8 +20,8 @@ constexpr std::uint8_t load = 0x41;    ///< payload: a change of it before torqu
 constexpr std::uint8_t point = 0x42;   ///< E: translation of the measured point in Ftool; never pushed
 }  // namespace body
 
-/// Slots of a link (M2): Rot(z,theta) Trans(z,d) Trans(x,a) Rot(y,gamma) Rot(x,alpha) Rot(y,beta); of base, tool and point
-/// (M3); of the payload. gamma has no constant part: it takes the tilt of axis_wobble.
+/// Slots of a link (M2): Rot(z,theta) Trans(z,d) Trans(x,a) Rot(y,gamma) Rot(x,alpha) Rot(y,beta); of base,
+/// tool and point (M3); of the payload. gamma has no constant part: it takes the tilt of axis_wobble.
 namespace slot {
 constexpr std::uint8_t theta = 0;  ///< rad
 constexpr std::uint8_t d = 1;      ///< m
@@ -95,8 +95,8 @@ enum class Covariate : std::uint8_t {
   relative_speed = 5,  ///< u_joint
 };
 
-/// Effect of the catalogue that a term belongs to (docs/effects.md has each), from which a set is read back into names.
-/// Numbers are on the wire: add, never change.
+/// Effect of the catalogue that a term belongs to (docs/effects.md has each), from which a set is read back
+/// into names. Numbers are on the wire: add, never change.
 enum class Effect : std::uint8_t {
   geometric = 0,             ///< constant of a slot
   joint_compliance = 1,      ///< angle per load torque (M12)
@@ -168,7 +168,8 @@ constexpr bool has_values(const TermList<S>& list, const Table& table) {
   return std::size_t{table.offset} + table.size <= list.value_count;
 }
 
-/// True where the basis needs torques, levers or moments, which are computed in the chain without effects (M15).
+/// True where the basis needs torques, levers or moments, which are computed in the chain without effects
+/// (M15).
 constexpr bool needs_loads(Basis b, Factor f) {
   return b == Basis::load_torque || b == Basis::load_torque_cubed || b == Basis::link_weight ||
          b == Basis::load_moment_x || b == Basis::load_moment_y || b == Basis::base_moment_x ||

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the control cycle computes in its own way, against the forward model that everything else uses: torques and
-// levers deflection through the links' frames, curves in powers, first-order motions; and the way of sets whose effects
-// only turn joints against the way of all other sets.
+// The kernels of the control cycle against the forward model: torques and levers in the links' frames (C12),
+// expanded curves, linearised deflections (C13), first-order twists (C3); and the joint-only path against the
+// general path.
 #include <flexcomp/compensate.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -35,25 +35,25 @@ std::array<flexcomp::SinCos<double>, 6> angles(const Model<double>& model, const
   return a;
 }
 
-/// Every kind of term that bends joints by loads, also of other joints and of a curve times torque.
+/// Every kind of term that deflects joints by loads, also of other joints and of a curve times torque.
 arms::TermSet<double> loaded_terms(const arms::Arm& arm, arms::Random& random) {
   arms::TermSet<double> set = arms::table1(arm);
   set.add(arms::on_load(slot::mass), Basis::one, 0.2);
   set.add(arms::on_load(slot::com_y), Basis::one, -0.01);
   set.add(arms::on_tool(slot::x), Basis::one, 0.002);
   for (std::size_t i = 0; i < 6; ++i) {
-    set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.linearised(1e-7), i);
-    set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.linearised(1e-5), i);
+    set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.around(1e-7), i);
+    set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.around(1e-5), i);
   }
   std::vector<double> c(24);
-  for (double& v : c) v = random.linearised(1e-5);
+  for (double& v : c) v = random.around(1e-5);
   flexcomp::Term<double>& t = set.add(arms::on_link(3, slot::theta), Basis::curve, 1.0, 2);
   t.table = set.add_curve(c);
   t.factor = Factor::load_torque;
   return set;
 }
 
-TEST(JointDeflection, TorquesAndLeversAreThoseOfTheForwardModel) {
+TEST(JointDeflection, LoadsMatchTheForwardModel) {
   arms::Random random(31);
   double worst = 0, largest = 0;
   for (const arms::Arm& arm : arms::all()) {
@@ -78,12 +78,13 @@ TEST(JointDeflection, TorquesAndLeversAreThoseOfTheForwardModel) {
       }
     }
   }
-  std::printf("[ measured ] deflection up to %.1e rad, both ways agree to %.1e rad\n", largest, worst);
+  std::printf("[ measured ] deflection up to %.1e rad, difference to the forward model %.1e rad\n", largest,
+              worst);
   EXPECT_GT(largest, 1e-3);
   EXPECT_LE(worst, 1e-13);
 }
 
-TEST(JointDeflection, AroundAChainItIsTheSameAndChangesAsItShould) {
+TEST(JointDeflection, LinearisationMatchesValueAndDifferences) {
   arms::Random random(32);
   double worst = 0, worst_change = 0;
   for (const arms::Arm& arm : arms::all()) {
@@ -105,11 +106,11 @@ TEST(JointDeflection, AroundAChainItIsTheSameAndChangesAsItShould) {
       chain.set(model, q, joints, flange, load, linearised);
       for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(deflection[i] - linearised[i]));
 
-      // Against differences. What bends a link between a lever's ends is left out on purpose: that is joint 4 of the
-      // arm with three parallel axes.
+      // Against differences. The linearisation leaves out joints between a lever's ends: joint 4 of the arm
+      // with three parallel axes.
       Joints by, beyond = q, before = q;
       for (std::size_t i = 0; i < 6; ++i) {
-        by[i] = i == 3 && arm.parallel_3 ? 0 : random.linearised(1e-4);
+        by[i] = i == 3 && arm.parallel_3 ? 0 : random.around(1e-4);
         beyond[i] += by[i];
         before[i] -= by[i];
       }
@@ -123,25 +124,25 @@ TEST(JointDeflection, AroundAChainItIsTheSameAndChangesAsItShould) {
       }
     }
   }
-  std::printf("[ measured ] linearised a chain to %.1e rad; for turns of 1e-4 rad the change to %.1e rad\n",
-              worst, worst_change);
+  std::printf("[ measured ] linearised to %.1e rad; for turns of 1e-4 rad the change to %.1e rad\n", worst,
+              worst_change);
   EXPECT_LE(worst, 1e-13);
   EXPECT_LE(worst_change, 1e-9);  // 1e-4 rad times a slope of up to 1e-2 is 1e-6
 }
 
-TEST(JointDeflection, ACurveInPowersIsTheSpline) {
+TEST(JointDeflection, ExpandedCurveMatchesTheSpline) {
   arms::Random random(33);
   for (const std::size_t size : {6U, 7U, 18U, 128U, 256U}) {
     arms::TermSet<double> set;
     std::vector<double> c(size);
-    for (double& v : c) v = random.linearised(1);
+    for (double& v : c) v = random.around(1);
     flexcomp::Term<double>& t = set.add(arms::on_link(1, slot::theta), Basis::curve, 1.0, 0);
     t.table = set.add_curve(c);
     Model<double> model;
     ASSERT_EQ(model.prepare(arms::tx60l(), set.list()), flexcomp::Refusal::none);
     double value = 0, slope = 0, bend = 0;
     for (int n = 0; n < 20000 / part; ++n) {
-      const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.linearised(30);
+      const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.around(30);
       detail::Expansion<double> at{0, 0, 0};
       detail::expand_curve(model, t, q, 1.0, at);
       const double h = 1e-4 / static_cast<double>(size);
@@ -158,7 +159,7 @@ TEST(JointDeflection, ACurveInPowersIsTheSpline) {
   }
 }
 
-TEST(JointDeflection, FirstOrderMotionsAreThoseOfTheChain) {
+TEST(JointDeflection, ConstantTwistMatchesTheChain) {
   arms::Random random(34);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1_geometry(arm, 0.01);
@@ -190,7 +191,7 @@ TEST(JointDeflection, FirstOrderMotionsAreThoseOfTheChain) {
   }
 }
 
-/// Largest miss of the position over regular poses, m.
+/// Largest remaining position error over regular poses, m.
 double left_by(const arms::Robot& robot, const Model<double>& model, arms::Random& random, bool with_force) {
   const arms::NominalJacobian jacobian(robot);
   double left = 0;
@@ -204,7 +205,7 @@ double left_by(const arms::Robot& robot, const Model<double>& model, arms::Rando
     flexcomp::Context<double, 6> context = flexcomp::default_context<double>(robot);
     for (double& d : context.direction) d = static_cast<double>(random.below(3)) - 1;
     context.temperature_c = random.uniform(10, 40);
-    if (with_force) context.force_n = {random.linearised(20), random.linearised(20), random.linearised(20)};
+    if (with_force) context.force_n = {random.around(20), random.around(20), random.around(20)};
     const flexcomp::Compensated<double, 6> r = flexcomp::compensate(model, q, context);
     if (r.status != flexcomp::StepStatus::ok) continue;
     left = std::max(left, flexcomp::target_residual(model, r.q, q, context).position_m);
@@ -212,19 +213,19 @@ double left_by(const arms::Robot& robot, const Model<double>& model, arms::Rando
   return left;
 }
 
-TEST(JointDeflection, AllKindsOfTermsThatTurnJointsAreTakenOff) {
+TEST(JointDeflection, JointOnlyPathCompensatesEveryTermOfJoints) {
   arms::Random random(35);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
     arms::add_joint_curves(set, random, 200e-6, 40);
     for (std::size_t i = 0; i < 6; ++i) {
       const flexcomp::Place own = arms::on_link(i + 1, slot::theta);
-      set.add(own, Basis::sine, random.linearised(1e-4), i, 2);
-      set.add(own, Basis::cosine, random.linearised(2e-5), i, 100);
-      set.add(own, Basis::joint_position, random.linearised(2e-4), i);
-      set.add(own, Basis::direction, random.linearised(1e-4), i);
-      set.add(own, Basis::sine, random.linearised(1e-4), (i + 1) % 6, 1);
-      set.add(own, Basis::joint_position, random.linearised(1e-4), (i + 5) % 6);
+      set.add(own, Basis::sine, random.around(1e-4), i, 2);
+      set.add(own, Basis::cosine, random.around(2e-5), i, 100);
+      set.add(own, Basis::joint_position, random.around(2e-4), i);
+      set.add(own, Basis::direction, random.around(1e-4), i);
+      set.add(own, Basis::sine, random.around(1e-4), (i + 1) % 6, 1);
+      set.add(own, Basis::joint_position, random.around(1e-4), (i + 5) % 6);
     }
     set.add(arms::on_tool(slot::rx), Basis::one, 1e-3);
     set.add(arms::on_tool(slot::z), Basis::one, -1e-3);
@@ -239,13 +240,13 @@ TEST(JointDeflection, AllKindsOfTermsThatTurnJointsAreTakenOff) {
   }
 }
 
-TEST(JointDeflection, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
+TEST(JointDeflection, GeneralPathMatchesTheJointOnlyPath) {
   arms::Random random(36);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
     Model<double> joints_only;
     ASSERT_EQ(joints_only.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-    // Nothing, but it could be something: the same arm as far as any command can tell.
+    // A term that is always 0 here, but of a kind that takes the general path.
     set.add(arms::on_link(3, slot::a), Basis::direction, 1e-3, 2);
     Model<double> any;
     ASSERT_EQ(any.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
@@ -266,9 +267,9 @@ TEST(JointDeflection, SetsThatMoveMoreThanJointsTakeTheOtherWayToTheSameEnd) {
       if (a.status != flexcomp::StepStatus::ok) continue;
       for (std::size_t i = 0; i < 6; ++i) worst = std::max(worst, std::abs(a.q[i] - b.q[i]));
     }
-    std::printf("[ measured ] %s: the two ways differ by %.1e rad\n", arm.name, worst);
+    std::printf("[ measured ] %s: the two paths differ by %.1e rad\n", arm.name, worst);
     EXPECT_LE(worst, 3e-8) << arm.name;
-    // Both kinds are worth trying with everything: what moves more than joints must be taken off as well.
+    // Terms of links and frames must be compensated as well.
     set.add(arms::on_link(2, slot::alpha), Basis::load_moment_x, 2e-6, 1);
     set.add(arms::on_link(5, slot::gamma), Basis::sine, 1e-4, 4, 1);
     Model<double> more;

@@ -261,7 +261,7 @@ TEST_F(Canopen, RefusalsOfASet) {
   Robot other = arm.robot;
   other.name_hash = name_hash("other", 5);
   EXPECT_EQ(refused(make_image(other, 1)), co::abort::incompatible);
-  EXPECT_EQ(number(co::status_for_people, 3), static_cast<std::uint32_t>(Refusal::wrong_robot));
+  EXPECT_EQ(number(co::status_summary, 3), static_cast<std::uint32_t>(Refusal::wrong_robot));
   other = arm.robot;
   other.links[3].d_m += 1e-9;
   EXPECT_EQ(refused(make_image(other, 1)), co::abort::incompatible);
@@ -314,10 +314,10 @@ TEST_F(Canopen, PushPullAndProbe) {
 
   EXPECT_EQ(command(Command::rollback), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
-  EXPECT_EQ(number(co::status_for_people, 5), 5U);
+  EXPECT_EQ(number(co::status_summary, 5), 5U);
   EXPECT_EQ(expedited(0x1011, 1, co::load_signature, 4), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
-  EXPECT_EQ(number(co::status_for_people, 5), 0U);
+  EXPECT_EQ(number(co::status_summary, 5), 0U);
 }
 
 TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {

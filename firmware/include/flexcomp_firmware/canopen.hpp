@@ -16,32 +16,37 @@
 namespace flexcomp {
 namespace firmware {
 
-/// Sends one data frame with an 11-bit identifier. False where there is no room now: it is offered again at
-/// the next poll(), and a newer answer takes its place.
+/// Hook that sends one data frame with an 11-bit identifier. False where the queue is full: the frame is
+/// offered again at the next poll(), unless a newer answer replaces it.
 struct CanTransmit {
-  void* user = nullptr;
+  void* user = nullptr;  ///< given to the hook
+  /// Sends, or returns false.
   bool (*send)(void* user, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) = nullptr;
 };
 
+/// Settings of a node.
 struct CanopenSettings {
   std::uint8_t node = 1;                ///< 1 … 127
   std::uint16_t heartbeat_ms = 1000;    ///< producer heartbeat time after a reset; 0: none
-  std::uint32_t sdo_timeout_ms = 2000;  ///< a transfer on which nothing has come for so long is aborted
+  std::uint32_t sdo_timeout_ms = 2000;  ///< silence after which a transfer is aborted
 };
 
+/// One CANopen node on a device. `origin` must differ between the objects that share a device.
 class CanopenNode {
  public:
+  /// Starts in `initialising`; the first poll() sends the boot-up message.
   CanopenNode(Device& device, Origin origin, const CanopenSettings& settings, const CanTransmit& transmit);
   CanopenNode(const CanopenNode&) = delete;
   CanopenNode& operator=(const CanopenNode&) = delete;
 
-  /// A data frame with an 11-bit identifier (no remote frame) as it came from the bus. Any bytes are
-  /// survived.
+  /// Takes a data frame with an 11-bit identifier (no remote frame) from the bus: NMT (CiA 301, 7.2.8) or SDO
+  /// (7.2.4). Any bytes are valid input.
   void receive(std::uint16_t id, const std::uint8_t* bytes, std::size_t size);
 
-  /// Boot-up message, heartbeat, timeouts and frames that found no room. now_ms wraps.
+  /// Sends boot-up message, heartbeat and frames that were not taken; ends timed-out transfers. now_ms wraps.
   void poll(std::uint32_t now_ms);
 
+  /// NMT state.
   wire::canopen::NmtState state() const { return state_; }
 
  private:

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How a parameter set changes hands between the background, which takes sets in, and the control
-/// cycle, which uses one: a request word that only the background writes and an acknowledgement that only the
-/// cycle writes. The cycle reads the request once, never waits and never retries; the background may touch a
-/// model only when the cycle has acknowledged that it uses another one.
+/// Wait-free handover of a parameter set from the background to the control cycle: a request word that only
+/// the background writes and an acknowledgement that only the cycle writes. The cycle reads the request once,
+/// never waits and never retries; the background may touch a model only when the cycle has acknowledged that
+/// it uses another one.
 ///
 /// The countdown of a trial runs in the cycle: a set on trial reverts also when the background hangs.
 #ifndef FLEXCOMP_FIRMWARE_HANDOVER_HPP
@@ -15,6 +15,7 @@
 namespace flexcomp {
 namespace firmware {
 
+/// Request and acknowledgement words, and the countdown of a trial.
 class Handover {
  public:
   static constexpr std::uint32_t none = 2;  ///< no set: commands are passed through
@@ -41,6 +42,7 @@ class Handover {
            (1U << generation_shift);
   }
 
+  /// The model of the last request.
   std::uint32_t requested() const { return request_.load(std::memory_order_relaxed) & index_mask; }
 
   /// The model that the cycle uses; exact only while settled().
@@ -54,7 +56,7 @@ class Handover {
 
   // --- control cycle ----------------------------------------------------------------------------------
 
-  /// The model to use in this cycle (0, 1 or none); `changed` tells whether that is news.
+  /// The model to use in this cycle (0, 1 or none); `changed`: another one than in the cycle before.
   std::uint32_t take(bool& changed) {
     const std::uint32_t request = request_.load(std::memory_order_acquire);
     changed = false;

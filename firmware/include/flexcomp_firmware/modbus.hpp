@@ -16,7 +16,7 @@
 namespace flexcomp {
 namespace firmware {
 
-/// What one client sees: the map of modbus_map.hpp. One object per serial line and per TCP connection.
+/// The register map of modbus_map.hpp for one client: one object per serial line and per TCP connection.
 class ModbusServer {
  public:
   /// `origin` must differ between the objects that share a device, and from `nobody`.
@@ -28,7 +28,7 @@ class ModbusServer {
   /// application (04, 06).
   std::size_t answer(const std::uint8_t* request, std::size_t size, std::uint8_t* out);
 
-  /// The client is gone: what it has staged is dropped, offsets and probe are as at the start.
+  /// Ends a connection: discards what it has staged, resets offsets and probe.
   void disconnect();
 
  private:
@@ -52,18 +52,19 @@ class ModbusServer {
 /// Continues `crc` over more bytes; over a frame with its CRC it ends at 0.
 std::uint16_t modbus_crc(const std::uint8_t* bytes, std::size_t size, std::uint16_t crc = 0xFFFF);
 
-/// Where a server puts what it sends: called from within receive() or poll(), at most once per request.
+/// Hook that sends bytes: called from within receive() or poll(), at most once per request.
 struct Transmit {
-  void* user = nullptr;
+  void* user = nullptr;  ///< given to the hook
+  /// Sends the bytes, or copies them.
   void (*send)(void* user, const std::uint8_t* bytes, std::size_t size) = nullptr;
 };
 
 /// RTU framing on a serial line. A frame ends where its function code says, or, with an unknown function
-/// code, at the gap; whatever is left at a gap is dropped. Frames of other units are followed by their CRC.
+/// code, at the gap; what remains at a gap is discarded. Frames of other units are followed by their CRC.
 ///
-/// The standard ends a frame at 3.5 characters without a byte (1.75 ms above 19200 baud). Where bytes reach
-/// us in bursts (USB adapters, emulators) that tears frames, hence the length; the gap here only
-/// resynchronises and may be several times longer.
+/// Deviation from V1.02, 2.5.1.1: the standard ends a frame at 3.5 characters without a byte (1.75 ms above
+/// 19200 baud). Where bytes arrive in bursts (USB adapters, emulators) that splits frames, hence the length;
+/// the gap only resynchronises and may be several times longer.
 class ModbusRtu {
  public:
   /// `unit` 1 … 247.
@@ -95,6 +96,7 @@ class ModbusRtu {
 /// TCP framing (MBAP header) of one connection.
 class ModbusTcp {
  public:
+  /// `unit` 0 … 255; units 0 and 255 are answered as well.
   ModbusTcp(ModbusServer& server, std::uint8_t unit, const Transmit& transmit)
       : server_(&server), unit_(unit), transmit_(transmit) {}
 

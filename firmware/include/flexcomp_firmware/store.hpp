@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The parameter store: takes in a parameter image, checks it, writes it to non-volatile memory, makes
-/// it active, and brings it back after a power loss. One machine behind every bus.
+/// The parameter store: stages a parameter image, verifies it, writes it to non-volatile memory, activates
+/// it, and loads it at the next start. One state machine for every bus.
 ///
 /// Non-volatile memory has two slots. A slot holds the image from its first byte and, in its last 32 bytes, a
 /// seal:
@@ -35,17 +35,17 @@
 namespace flexcomp {
 namespace firmware {
 
+/// Result of a storage hook.
 enum class StorageResult : std::int8_t {
-  failed = -1,
-  done = 0,
-  busy =
-      1,  ///< erase and write only: nothing has been done yet, or it is under way; the same call comes again
+  failed = -1,  ///< reported as a fault
+  done = 0,     ///< complete
+  busy = 1,     ///< erase and write only: not complete, the same call comes again
 };
 
 /// Non-volatile memory as the store needs it: two slots (0 and 1) of slot_bytes each. The hooks are called
-/// from the background only. Where a hook is null the store keeps nothing and refuses to commit.
+/// from the background only. Where a hook is null nothing is stored and commits are refused.
 struct Storage {
-  void* user = nullptr;
+  void* user = nullptr;  ///< given to every hook
   /// Reads `size` bytes from `offset` of a slot; an unwritten slot may read as anything.
   StorageResult (*read)(void* user, unsigned slot, std::uint32_t offset, std::uint8_t* to,
                         std::uint32_t size) = nullptr;
@@ -57,23 +57,27 @@ struct Storage {
                          std::uint32_t size) = nullptr;
 };
 
+/// Settings of the store.
 struct StoreSettings {
   /// A set that changes the pose at any of the probe poses by more than this is refused as implausible.
   Scalar plausible_position_m = Scalar(0.05);
+  /// The same for the orientation, below pi / 2.
   Scalar plausible_orientation_rad = Scalar(0.1);
   /// Control cycles of a trial where the command names none.
   std::uint32_t trial_cycles = 60000;
-  /// A transfer on which nothing has come for so long is dropped, ms.
+  /// Silence after which a transfer is discarded, ms.
   std::uint32_t staging_timeout_ms = 30000;
 };
 
-/// Who speaks: a bus, or one connection of it. What one of them stages no other one may touch. Wide enough for a
-/// new number with every connection that is ever made.
+/// Client of the store: a bus, or one connection of it. No other client may touch what one has staged. Wide
+/// enough for a new number with every connection.
 using Origin = std::uint32_t;
-constexpr Origin nobody = 0;
+constexpr Origin nobody = 0;  ///< no client, or local control
 
+/// The store of one arm. All of it runs in the background; see the table of a slot at the top.
 class Store {
  public:
+  /// Without boot() there is no set.
   Store(const Robot& robot, ParameterSets& sets, const Storage& storage, const StoreSettings& settings);
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
@@ -82,7 +86,7 @@ class Store {
   /// fault `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again.
   void boot();
 
-  /// One command of the wire. What it ended with is in status() as well.
+  /// Runs one command of the wire; its answer is also in status().
   wire::Answer run(wire::Command command, std::uint32_t argument, Origin origin);
 
   /// begin() for a transfer whose length is not known yet: end() follows.
@@ -91,33 +95,33 @@ class Store {
   /// Bytes of the image from `offset`. They may overlap what came before but leave no gap.
   wire::Answer write(std::uint32_t offset, const std::uint8_t* bytes, std::uint32_t size, Origin origin);
 
-  /// The length of a transfer that began without one is what has come so far.
+  /// Ends a transfer that began without a length: it is the number of bytes so far.
   wire::Answer end(Origin origin);
 
-  /// The connection is gone: drops what it has staged. A commit under way is not touched.
+  /// Ends a connection: discards what it has staged. A commit being written is not touched.
   void disconnect(Origin origin);
 
-  /// Reads the active image as it lies in its slot. False beyond its end, without a set, or where reading
+  /// Reads the active image from its slot. False beyond its end, without a set, or where reading
   /// fails.
   bool read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size);
 
-  /// Goes on with what is under way; at most one storage call of 256 bytes each time. now_ms wraps.
+  /// Background work; at most one storage call of 256 bytes each time. now_ms wraps.
   void poll(std::uint32_t now_ms);
 
-  /// Fills what the store knows of the status record.
+  /// Fills the fields of the store in the status record.
   void status(wire::Status& out) const;
 
   /// The prepared set that is active, or null; valid until the next poll() or run().
   const FirmwareModel* active_model() const;
 
-  std::uint32_t active_bytes() const { return active_.bytes; }
-  std::uint32_t active_sequence() const { return active_.sequence; }
-  std::uint16_t active_slot() const { return active_.slot; }
-  std::uint16_t faults() const { return faults_; }
-  std::uint32_t announced_bytes() const { return announced_; }
-  Refusal refusal() const { return refusal_; }
-  const StoreSettings& settings() const { return settings_; }
-  const Sha256Digest& nominal_hash() const { return nominal_hash_; }
+  std::uint32_t active_bytes() const { return active_.bytes; }        ///< of the active image
+  std::uint32_t active_sequence() const { return active_.sequence; }  ///< 0: none
+  std::uint16_t active_slot() const { return active_.slot; }          ///< 0, 1 or wire::no_slot
+  std::uint16_t faults() const { return faults_; }                    ///< bits of wire::fault
+  std::uint32_t announced_bytes() const { return announced_; }        ///< of the staged image
+  Refusal refusal() const { return refusal_; }                        ///< of the last command
+  const StoreSettings& settings() const { return settings_; }         ///< as given
+  const Sha256Digest& nominal_hash() const { return nominal_hash_; }  ///< of the robot
 
  private:
   /// A set that is, or was, active.

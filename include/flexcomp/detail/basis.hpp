@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Bases of terms that need neither frames nor loads (docs/model.md, section 2): waves, splines (M6), grids (M7).
+/// Bases of terms that need neither frames nor loads (docs/model.md, section 2): waves, splines (M6), grids
+/// (M7).
 #ifndef FLEXCOMP_DETAIL_BASIS_HPP
 #define FLEXCOMP_DETAIL_BASIS_HPP
 
@@ -106,8 +107,8 @@ inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cel
   return upper + (lower - upper) * row.fraction;
 }
 
-/// Basis (M5) of a term that needs neither frames nor loads, at the readings q (rad). A curve's factor of torque is left
-/// to the caller.
+/// Basis (M5) of a term that needs neither frames nor loads, at the readings q (rad). A curve's factor of
+/// torque is left to the caller.
 template <class S, std::size_t N, class Cap>
 inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
                            const std::array<S, N>& q) {

@@ -7,11 +7,12 @@
 ///     [P  Q^T] [u]   [e_p]        P = Jp Jp^T + lp^2 1,   Q = Jo Jp^T,
 ///     [Q  O  ] [v] = [e_o],       M = Jo Jo^T - Q P^-1 Q^T + lo^2 1,   dq = Jp^T u + Jo^T v
 ///
-/// Both dampings (C9) are zero where the arm is regular. Near a singularity lo grows first and smoothly: the first block
-/// row still holds exactly, so the error stays in the orientation. lp grows only where the position itself is singular.
-/// The solution has two parts: one for the position, and one for the orientation that leaves the tool point in place.
-/// Each is scaled as a whole, never joint by joint, and the second is limited more strictly from one correction to the
-/// next (C10), because at a stretched arm its corrections would not converge.
+/// Both dampings (C9) are zero where the arm is regular. Near a singularity lo grows first and smoothly: the
+/// first block row still holds exactly, so the error stays in the orientation. lp grows only where the
+/// position itself is singular. The solution has two parts: one for the position, and one for the orientation
+/// that leaves the tool point in place. Each is scaled as a whole, never joint by joint, and the second is
+/// limited more strictly from one correction to the next (C10), because at a stretched arm its corrections
+/// would not converge.
 #ifndef FLEXCOMP_DETAIL_DAMPED_JACOBIAN_SOLVER_HPP
 #define FLEXCOMP_DETAIL_DAMPED_JACOBIAN_SOLVER_HPP
 
@@ -67,8 +68,8 @@ inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>&
   inverse = e.over(d.xx * e.xx + d.xy * e.xy + d.xz * e.xz);
 }
 
-/// Limit of the orientation part in a correction (0, 1, 2), relative to the largest correction (C10). A regular pose needs
-/// far less in the second and third; a stretched arm would use all of it.
+/// Limit of the orientation part in a correction (0, 1, 2), relative to the largest correction (C10). A
+/// regular pose needs far less in the second and third; a stretched arm would use all of it.
 template <class S>
 constexpr S allowed_turn(int correction) {
   return correction == 0 ? S(1) : correction == 1 ? S(0.2) : S(0.02);
@@ -173,11 +174,13 @@ class DampedJacobianSolver {
   bool is_damped() const { return damped_; }
   /// kappa of (C9), the smaller one of both blocks, at most 1: m^2, or 1 for orientation.
   S regular() const { return regular_; }
-  /// True where turns of the joints since set() with this sum of squares (rad^2) change the Jacobian by a tenth or more.
+  /// True where turns of the joints since set() with this sum of squares (rad^2) change the Jacobian by a
+  /// tenth or more.
   bool jacobian_is_stale(S square) const { return !(square <= S(0.01) * regular_); }
 
-  /// Solution (C8) for errors of position (m) and orientation (rad) in F0: joint turns dq, rad. The position part is
-  /// limited to `largest`, the orientation part to `largest_turn` (C10). Returns the sum of squares of dq.
+  /// Solution (C8) for errors of position (m) and orientation (rad) in F0: joint turns dq, rad. The position
+  /// part is limited to `largest`, the orientation part to `largest_turn` (C10). Returns the sum of squares
+  /// of dq.
   S solve(const Vec3<S>& position, const Vec3<S>& orientation, S largest, S largest_turn,
           std::array<S, N>& dq) {
     const S px = position.x, py = position.y, pz = position.z;
@@ -193,7 +196,8 @@ class DampedJacobianSolver {
     const S wx = gain_[0] * vx + gain_[3] * vy + gain_[6] * vz;
     const S wy = gain_[1] * vx + gain_[4] * vy + gain_[7] * vz;
     const S wz = gain_[2] * vx + gain_[5] * vy + gain_[8] * vz;
-    // |position part|^2 <= u . position and |orientation part|^2 <= v . e: in most cases nothing has to be scaled.
+    // |position part|^2 <= u . position and |orientation part|^2 <= v . e: in most cases nothing has to be
+    // scaled.
     if (!(ux * px + uy * py + uz * pz <= largest * largest &&
           vx * ex + vy * ey + vz * ez <= largest_turn * largest_turn)) {
       return solve_limited({ux, uy, uz}, {vx, vy, vz}, {wx, wy, wz}, largest, largest_turn, dq);

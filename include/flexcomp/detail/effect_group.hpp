@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Groups of a model's effects by the kernel that evaluates them in the control cycle (docs/compensation.md, section 1).
+/// Groups of a model's effects by the kernel that evaluates them in the control cycle (docs/compensation.md,
+/// section 1).
 #ifndef FLEXCOMP_DETAIL_EFFECT_GROUP_HPP
 #define FLEXCOMP_DETAIL_EFFECT_GROUP_HPP
 
@@ -12,7 +13,8 @@
 namespace flexcomp {
 namespace detail {
 
-/// Groups of effects by the kernel that evaluates them. The first `count` are lists of a model, in this order.
+/// Groups of effects by the kernel that evaluates them. The first `count` are lists of a model, in this
+/// order.
 namespace group {
 constexpr std::uint8_t lever = 0;         ///< link weight, (M13)
 constexpr std::uint8_t other_loaded = 1;  ///< load torque of another joint, cubed, or times a curve
@@ -23,8 +25,8 @@ constexpr std::uint8_t own_compliance = 5;  ///< added up in one coefficient for
 constexpr std::uint8_t none = 6;            ///< not for the control cycle, or not for its joint-only path
 }  // namespace group
 
-/// The group of an effect that a model of N joints has accepted. `only_joint_deflections` becomes false for one that
-/// needs frames or moves more than a joint angle: it is in no list.
+/// The group of an effect that a model of N joints has accepted. `only_joint_deflections` becomes false for
+/// one that needs frames or moves more than a joint angle: it is in no list.
 template <std::size_t N, class S>
 inline std::uint8_t effect_group(const Term<S>& t, bool& only_joint_deflections) {
   if (t.place.body == body::point) return group::none;  // moves what is measured, not the arm

@@ -13,8 +13,9 @@
 namespace flexcomp {
 namespace detail {
 
-/// Corrected command q (rad) by three corrections with the two-pass forward model (C16): Newton, Newton, chord.
-/// `target` is the nominal pose in F0; on entry q is the command and the solver holds the nominal Jacobian.
+/// Corrected command q (rad) by three corrections with the two-pass forward model (C16): Newton, Newton,
+/// chord. `target` is the nominal pose in F0; on entry q is the command and the solver holds the nominal
+/// Jacobian.
 template <class S, std::size_t N, class Cap>
 inline void correct_general(const Model<S, N, Cap>& model, const Pose<S>& target,
                             const Context<S, N>& context, const CompensationSettings<S>& settings,
@@ -34,8 +35,9 @@ inline void correct_general(const Model<S, N, Cap>& model, const Pose<S>& target
       orientation = {dot(b.a, orientation), dot(b.b, orientation), dot(b.c, orientation)};
     }
     if (k == 1) {
-      // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some
-      // percent: from here on the Jacobian of the deflected chain is used, which is close to that of the solution.
+      // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by
+      // some percent: from here on the Jacobian of the deflected chain is used, which is close to that of the
+      // solution.
       for (std::size_t i = 0; i < N; ++i)
         solver.joints()[i] = {vec3<S>(ws.frames.axis(i, 2)), vec3<S>(ws.frames.origin[i])};
       const Vec3<S> tool = vec3<S>(model.tool_pose().position);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Joint deflections by loads and link weight (docs/compensation.md, C12 and C13), for sets whose effects all turn joints
-/// (Model::has_only_joint_deflections()).
+/// Joint deflections by loads and link weight (docs/compensation.md, C12 and C13), for sets whose effects all
+/// turn joints (Model::has_only_joint_deflections()).
 ///
-/// The torques are those of forward.hpp (M11), where the load is one force and one moment in F0. Here gravity is
-/// propagated outward and the moment inward in the links' own frames: the static part of the recursive Newton-Euler
-/// method (Luh, Walker and Paul 1980). It needs neither axes nor origins in F0 and half as many operations;
-/// core_joint_deflection_test compares the two.
+/// The torques are those of forward.hpp (M11), where the load is one force and one moment in F0. Here gravity
+/// is propagated outward and the moment inward in the links' own frames: the static part of the recursive
+/// Newton-Euler method (Luh, Walker and Paul 1980). It needs neither axes nor origins in F0 and half as many
+/// operations; core_joint_deflection_test compares the two.
 #ifndef FLEXCOMP_DETAIL_JOINT_DEFLECTION_HPP
 #define FLEXCOMP_DETAIL_JOINT_DEFLECTION_HPP
 
@@ -43,7 +43,8 @@ inline void static_load(const Model<S, N, Cap>& model, const Context<S, N>& cont
   load.is_plain = !load.has_force && model.has_axial_gravity();
 }
 
-/// Coordinates of a direction: from the frame after a link to the middle frame, between its Rot(z) and its Trans.
+/// Coordinates of a direction: from the frame after a link to the middle frame, between its Rot(z) and its
+/// Trans.
 template <class S>
 inline Vec3<S> link_end_to_middle(const LinkShape<S>& link, const Vec3<S>& v) {
   S x = v.x, z = v.z;
@@ -59,14 +60,16 @@ inline Vec3<S> middle_to_link_start(const SinCos<S>& theta, const Vec3<S>& v) {
   return {theta.c * v.x - theta.s * v.y, theta.s * v.x + theta.c * v.y, v.z};
 }
 
-/// A uniform field in each link's middle frame, and the torque about each joint per unit of mass or force (C12).
+/// A uniform field in each link's middle frame, and the torque about each joint per unit of mass or force
+/// (C12).
 template <class S, std::size_t N>
 struct LinkLoads {
   std::array<Vec3<S>, N> field;
   std::array<S, N> torque;
 };
 
-/// Propagates a field of F0 outward, and inward its moment on `arm` (flange frame, m), as in (C12). Work: two passes.
+/// Propagates a field of F0 outward, and inward its moment on `arm` (flange frame, m), as in (C12). Work: two
+/// passes.
 template <class S, std::size_t N>
 inline void propagate_statics(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
                               const Vec3<S>& field, const Vec3<S>& arm, LinkLoads<S, N>& out) {
@@ -186,7 +189,8 @@ FLEXCOMP_ONCE void add_other_loaded(const Model<S, N, Cap>& model, const std::ar
   }
 }
 
-/// Deflection of every joint by load and link weight, rad: compliances (M12), levers (M14), curves times torque.
+/// Deflection of every joint by load and link weight, rad: compliances (M12), levers (M14), curves times
+/// torque.
 template <class S, std::size_t N, class Cap>
 FLEXCOMP_ONCE void load_deflection(const Model<S, N, Cap>& model, const std::array<S, N>& q,
                                    const std::array<SinCos<S>, N>& angle, const StaticLoad<S>& load,
@@ -210,9 +214,10 @@ FLEXCOMP_ONCE void load_deflection(const Model<S, N, Cap>& model, const std::arr
   if (model.other_loaded_count() != 0) add_other_loaded(model, q, loads.torque, delta);
 }
 
-/// load_deflection() of a chain whose axes are known, and its first-order change (C13): moments about axes in F0, (M11).
-/// Only for gravity along z of F0 and without external force (StaticLoad::is_plain). The change leaves out the second
-/// order and the motion of joints between a lever's ends: it is the start of (C15), not its result.
+/// load_deflection() of a chain whose axes are known, and its first-order change (C13): moments about axes in
+/// F0, (M11). Only for gravity along z of F0 and without external force (StaticLoad::is_plain). The change
+/// leaves out the second order and the motion of joints between a lever's ends: it is the start of (C15), not
+/// its result.
 template <class S, std::size_t N>
 class LinearisedDeflection {
  public:
@@ -267,7 +272,8 @@ class LinearisedDeflection {
   template <class Cap>
   void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints,
               const std::array<S, N>& by, std::array<S, N>& delta) const {
-    // The z of axis x arm gives the torque: joints further out move the arm's end, joints further in turn it as a whole.
+    // The z of axis x arm gives the torque: joints further out move the arm's end, joints further in turn it
+    // as a whole.
     S ux = S(0), uy = S(0);
     for (std::size_t i = N; i-- > 0;) {
       const S v = by[i];

@@ -2,10 +2,10 @@
 /// \file
 /// Compensation of sets whose effects all turn joints (docs/compensation.md, sections 2 and 4).
 ///
-/// 1. The nominal chain gives the target pose and the Jacobian J. The constant terms are one twist to first order, and
-///    its solution is the first correction (C3).
-/// 2. The chain with its constant terms gives the remaining error (C5). It is solved with the factored J and refined to
-///    second order (C6), or J is factored anew where it has changed by a tenth.
+/// 1. The nominal chain gives the target pose and the Jacobian J. The constant terms are one twist to first
+///    order, and its solution is the first correction (C3).
+/// 2. The chain with its constant terms gives the remaining error (C5). It is solved with the factored J and
+///    refined to second order (C6), or J is factored anew where it has changed by a tenth.
 /// 3. The chain's joints stand at psi = q + delta(q) (C2): q is solved for by (C13) to (C15).
 #ifndef FLEXCOMP_DETAIL_JOINT_ONLY_PATH_HPP
 #define FLEXCOMP_DETAIL_JOINT_ONLY_PATH_HPP
@@ -21,8 +21,8 @@
 namespace flexcomp {
 namespace detail {
 
-/// Target of the flange and the tool point of the chain with constant terms, in F0 (C4): the nominal pose without B and
-/// without the tool's constant terms.
+/// Target of the flange and the tool point of the chain with constant terms, in F0 (C4): the nominal pose
+/// without B and without the tool's constant terms.
 template <class S>
 struct FlangeTarget {
   FlangePose<S> flange;
@@ -58,15 +58,15 @@ inline void flange_target(const Model<S, N, Cap>& model, FlangeTarget<S>& target
   }
 }
 
-/// Most refinements of a linear solution (C6). The error of the factored Jacobian, some 1e-2, is the ratio of each
-/// remainder to the one before.
+/// Most refinements of a linear solution (C6). The error of the factored Jacobian, some 1e-2, is the ratio of
+/// each remainder to the one before.
 constexpr int most_refinements = 3;
-/// Most fixed-point steps of the deflection (C15). Its slope, some 1e-3 on a stiff arm, is the ratio of each remainder to
-/// the one before.
+/// Most fixed-point steps of the deflection (C15). Its slope, some 1e-3 on a stiff arm, is the ratio of each
+/// remainder to the one before.
 constexpr int most_deflection_steps = 6;
 
-/// Ends of the iterations (C7), squares of rad. By the estimates `first_solution` and `linearised` a float may leave a step
-/// out; at 0 a double never does.
+/// Ends of the iterations (C7), squares of rad. By the estimates `first_solution` and `linearised` a float
+/// may leave a step out; at 0 a double never does.
 template <class S>
 struct Tolerance {
   static constexpr S correction = S(1e-8);        ///< of the chain: the next one is of third order in it
@@ -84,9 +84,10 @@ struct Tolerance<float> {
   static constexpr float deflection_step = 1e-14F;
 };
 
-/// Corrected command q (rad) of a set whose effects all turn joints: psi by the rigid inverse, then q from it (C2).
-/// On entry `angle` has the nominal offsets, `target` is the nominal pose, the solver holds the nominal Jacobian and q is
-/// the command. Work: at most 2 chain passes, 1 factorisation, 9 linear solutions and 7 deflections.
+/// Corrected command q (rad) of a set whose effects all turn joints: psi by the rigid inverse, then q from it
+/// (C2). On entry `angle` has the nominal offsets, `target` is the nominal pose, the solver holds the nominal
+/// Jacobian and q is the command. Work: at most 2 chain passes, 1 factorisation, 9 linear solutions and 7
+/// deflections.
 template <class S, std::size_t N, class Cap>
 inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarget<S>& target,
                                       const Context<S, N>& context, std::array<SinCos<S>, N>& angle,
@@ -147,20 +148,20 @@ inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarge
     Vec3<S> turn;
     rotation_error(target.flange.axes, flange.axes, turn);
     const S largest_turn = largest * allowed_turn<S>(k);
-    // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some percent:
-    // from there on the Jacobian of this chain is used, which is close to that of the solution.
+    // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by
+    // some percent: from there on the Jacobian of this chain is used, which is close to that of the solution.
     if (k == 1 && (solver.is_damped() || solver.jacobian_is_stale(turned))) {
       solver.joints() = joints;
       solver.set(point, settings);
       fresh = true;
     }
     S square = solver.solve(shift, turn, largest, largest_turn, dq);
-    // The relative error of the factored Jacobian, and of the correction, is about the turn over the smallest singular
-    // value.
+    // The relative error of the factored Jacobian, and of the correction, is about the turn over the smallest
+    // singular value.
     bool done = fresh || turned * square <= Tolerance<S>::first_solution * solver.regular();
     for (int n = 0; n < most_refinements && !done; ++n) {
-      // The factored Jacobian is the nominal arm's, with a relative error of some 1e-2: the remainder, with the second
-      // order of the motion (C6), is solved for again.
+      // The factored Jacobian is the nominal arm's, with a relative error of some 1e-2: the remainder, with
+      // the second order of the motion (C6), is solved for again.
       motion(joints, point, dq, move);
       const Vec3<S> shift_left = {shift.x - move.linear.x, shift.y - move.linear.y, shift.z - move.linear.z};
       const Vec3<S> turn_left = {turn.x - move.angular.x, turn.y - move.angular.y, turn.z - move.angular.z};
@@ -179,7 +180,8 @@ inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarge
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) q[i] += dq[i];
     if (k == most_corrections - 1) break;
-    // Where the solution is damped, the last correction decides how much of the error remains: it is never left out.
+    // Where the solution is damped, the last correction decides how much of the error remains: it is never
+    // left out.
     if (done && !solver.is_damped() && square <= (fresh ? S(0.02) : S(1)) * Tolerance<S>::correction) break;
     rotate_all(angle, dq, square);
   }
@@ -212,8 +214,8 @@ inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarge
   }
   S square = square_of(dq);
   if (loaded && load.is_plain && k == 1 && model.other_count() == 0 && model.other_loaded_count() == 0) {
-    // The linearised change leaves out the curvature of the deflection, which is of the size of the deflection (sines of
-    // some rad).
+    // The linearised change leaves out the curvature of the deflection, which is of the size of the
+    // deflection (sines of some rad).
     if (square_of(deflection) * square * square <= Tolerance<S>::linearised) return;
   }
   for (int n = 0; n < most_deflection_steps; ++n) {
@@ -237,7 +239,8 @@ inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarge
       q[i] += step;
       square += step * step;
     }
-    // The remainder is smaller by the slope, which for sines of some rad is of the size of the deflection itself.
+    // The remainder is smaller by the slope, which for sines of some rad is of the size of the deflection
+    // itself.
     if (square * size <= Tolerance<S>::deflection_step) break;
   }
 }

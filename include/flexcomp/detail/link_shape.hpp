@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Constant part of a link (M2), the small transform (M3) and the twist between two poses (M17) of docs/model.md.
+/// Constant part of a link (M2), the small transform (M3) and the twist between two poses (M17) of
+/// docs/model.md.
 #ifndef FLEXCOMP_DETAIL_LINK_SHAPE_HPP
 #define FLEXCOMP_DETAIL_LINK_SHAPE_HPP
 
@@ -30,7 +31,8 @@ struct SmallMotion {
   Vec3<S> angular;  ///< rotation vector, rad
 };
 
-/// Rigid transform of six values x, y, z, rx, ry, rz (M3): Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and rad.
+/// Rigid transform of six values x, y, z, rx, ry, rz (M3): Trans(x,y,z) Rot(z,rz) Rot(y,ry) Rot(x,rx); m and
+/// rad.
 template <class S>
 inline Pose<S> small_pose(const std::array<S, 6>& v) {
   const SinCos<S> x = sin_cos(v[slot::rx]);

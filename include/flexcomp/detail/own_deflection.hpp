@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Joint deflections that depend on readings and context alone (docs/compensation.md, C11 and C14): curves, sines, scale,
-/// directions, grids.
+/// Joint deflections that depend on readings and context alone (docs/compensation.md, C11 and C14): curves,
+/// sines, scale, directions, grids.
 #ifndef FLEXCOMP_DETAIL_OWN_DEFLECTION_HPP
 #define FLEXCOMP_DETAIL_OWN_DEFLECTION_HPP
 
@@ -14,13 +14,15 @@
 namespace flexcomp {
 namespace detail {
 
-/// Second-order Taylor expansion of a function of a joint's reading: value, slope per rad and half the second derivative.
+/// Second-order Taylor expansion of a function of a joint's reading: value, slope per rad and half the second
+/// derivative.
 template <class S>
 struct Expansion {
   S value, slope, half_curvature;
 };
 
-/// Adds k times the spline (M6) at the reading q (rad): the cubic of its cell in powers of the distance to the cell's start.
+/// Adds k times the spline (M6) at the reading q (rad): the cubic of its cell in powers of the distance to
+/// the cell's start.
 template <class S, std::size_t N, class Cap>
 inline void expand_curve(const Model<S, N, Cap>& model, const Term<S>& term, const S& q, const S& k,
                          Expansion<S>& sum) {
@@ -99,8 +101,8 @@ inline void add_other_deflections(const Model<S, N, Cap>& model, const std::arra
   }
 }
 
-/// Solves x + own(x) = q for the readings x by one step of Newton's method with the curvature (C14), in place.
-/// `share` becomes w = 1 / (1 + own').
+/// Solves x + own(x) = q for the readings x by one step of Newton's method with the curvature (C14), in
+/// place. `share` becomes w = 1 / (1 + own').
 template <class S, std::size_t N, class Cap>
 inline void subtract_own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
                                      std::array<S, N>& q, std::array<S, N>& dq, std::array<S, N>& share) {

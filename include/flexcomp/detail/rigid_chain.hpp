@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Kinematics of the chain with its constant terms alone, for the control cycle: axes, origins, flange, and small motions
-/// (docs/model.md, M2 and M17). Written out in scalars so that a link stays in the processor's registers.
+/// Kinematics of the chain with its constant terms alone, for the control cycle: axes, origins, flange, and
+/// small motions (docs/model.md, M2 and M17). Written out in scalars so that a link stays in the processor's
+/// registers.
 #ifndef FLEXCOMP_DETAIL_RIGID_CHAIN_HPP
 #define FLEXCOMP_DETAIL_RIGID_CHAIN_HPP
 
@@ -28,8 +29,8 @@ struct FlangePose {
   Vec3<S> origin;
 };
 
-/// Forward kinematics of a rigid chain (M2): axes and origins of its joints, and its flange, in F0. `angle` holds sines and
-/// cosines of readings plus offsets. Work: at most 30 multiplications per link.
+/// Forward kinematics of a rigid chain (M2): axes and origins of its joints, and its flange, in F0. `angle`
+/// holds sines and cosines of readings plus offsets. Work: at most 30 multiplications per link.
 template <class S, std::size_t N>
 inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
                        std::array<JointAxis<S>, N>& joints, FlangePose<S>& flange) {
@@ -104,8 +105,8 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
   flange.origin = {px, py, pz};
 }
 
-/// Twist of the flange by the constant terms, to first order (C3): at the origin of F0, m and rad. The links' twists are
-/// added up from the flange inward. `angle` as in the nominal rigid_pass().
+/// Twist of the flange by the constant terms, to first order (C3): at the origin of F0, m and rad. The links'
+/// twists are added up from the flange inward. `angle` as in the nominal rigid_pass().
 template <class S, std::size_t N, class Cap>
 inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
                            SmallMotion<S>& out) {
@@ -149,8 +150,8 @@ inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCo
   out.angular = {wx, wy, wz};
 }
 
-/// Orientation error (C5), sin(angle) times the axis of the rotation from `from` to `to` (columns), in the outer frame; it
-/// is the rotation vector to third order.
+/// Orientation error (C5), sin(angle) times the axis of the rotation from `from` to `to` (columns), in the
+/// outer frame; it is the rotation vector to third order.
 template <class S>
 inline void rotation_error(const Mat3<S>& to, const Mat3<S>& from, Vec3<S>& error) {
   S x = from.a.y * to.a.z - from.a.z * to.a.y;
@@ -224,8 +225,8 @@ inline void motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool
   out.angular = {wx, wy, wz};
 }
 
-/// Sines and cosines of readings plus the links' offsets. The readings are within the limits of a Model, thus in the
-/// range of the kernel.
+/// Sines and cosines of readings plus the links' offsets. The readings are within the limits of a Model, thus
+/// in the range of the kernel.
 template <class S, std::size_t N>
 inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
                         std::array<SinCos<S>, N>& angle) {
@@ -244,8 +245,8 @@ FLEXCOMP_ONCE void rotate_all_large(std::array<SinCos<S>, N>& angle, const std::
   for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
 }
 
-/// Adds turns to all angles; `square` is their sum of squares, rad^2. Without the last terms of rotate(), which are below
-/// 1e-11 up to 1/64 rad.
+/// Adds turns to all angles; `square` is their sum of squares, rad^2. Without the last terms of rotate(),
+/// which are below 1e-11 up to 1/64 rad.
 template <class S, std::size_t N>
 FLEXCOMP_ONCE void rotate_all(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by, S square) {
   if (!(square < S(0.000244140625))) {

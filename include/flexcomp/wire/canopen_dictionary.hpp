@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The object dictionary as a table: every object with its type, access, size and name, the one home of what
-/// canopen_objects.hpp explains. The firmware serves it, the host writes the electronic data sheet (CiA 306) of it.
+/// The object dictionary of canopen_objects.hpp as a table: type, access, size and name of every object. The
+/// firmware serves it, the host writes its electronic data sheet (CiA 306).
 #ifndef FLEXCOMP_WIRE_CANOPEN_DICTIONARY_HPP
 #define FLEXCOMP_WIRE_CANOPEN_DICTIONARY_HPP
 
@@ -18,31 +18,33 @@ namespace canopen {
 
 /// Data types by their index in the dictionary (CiA 301, table 44).
 enum class Type : std::uint8_t {
-  u8 = 0x05,
-  u16 = 0x06,
-  u32 = 0x07,
-  real32 = 0x08,
-  text = 0x09,
-  domain = 0x0F,
+  u8 = 0x05,      ///< UNSIGNED8
+  u16 = 0x06,     ///< UNSIGNED16
+  u32 = 0x07,     ///< UNSIGNED32
+  real32 = 0x08,  ///< REAL32
+  text = 0x09,    ///< VISIBLE_STRING
+  domain = 0x0F,  ///< DOMAIN
 };
 
+/// Access to an object.
 enum class Access : std::uint8_t {
   constant,  ///< read-only, and never another value
-  ro,
-  wo,
-  rw
+  ro,        ///< read only
+  wo,        ///< write only
+  rw         ///< read and write
 };
 
+/// One object, or one sub-index of it.
 struct Object {
-  std::uint16_t index;
-  std::uint8_t sub;
-  Type type;
-  Access access;
-  std::uint16_t size;  ///< bytes; 0 where they vary
-  const char*
-      name;  ///< for people; sub 0 of a record: "Highest sub-index", what the record is: record_name()
+  std::uint16_t index;  ///< of the object
+  std::uint8_t sub;     ///< sub-index, 0 where there is one value only
+  Type type;            ///< of the value
+  Access access;        ///< by SDO
+  std::uint16_t size;   ///< bytes; 0 where they vary
+  const char* name;     ///< in the EDS; of the record itself: record_name()
 };
 
+/// All objects, by index and sub-index.
 constexpr Object objects[] = {
     {device_type, 0, Type::u32, Access::constant, 4, "Device type"},
     {error_register, 0, Type::u8, Access::ro, 1, "Error register"},
@@ -63,14 +65,14 @@ constexpr Object objects[] = {
     {sdo_server, 2, Type::u32, Access::ro, 4, "COB-ID server to client"},
     {capability, 0, Type::domain, Access::ro, capability_bytes, "Capability record"},
     {status, 0, Type::domain, Access::ro, status_bytes, "Status record"},
-    {status_for_people, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
-    {status_for_people, 1, Type::u16, Access::ro, 2, "State of the parameter store"},
-    {status_for_people, 2, Type::u16, Access::ro, 2, "Answer to the last command"},
-    {status_for_people, 3, Type::u16, Access::ro, 2, "Refusal of the last command"},
-    {status_for_people, 4, Type::u16, Access::ro, 2, "Faults"},
-    {status_for_people, 5, Type::u32, Access::ro, 4, "Sequence of the active set"},
-    {status_for_people, 6, Type::u32, Access::ro, 4, "Detail"},
-    {status_for_people, 7, Type::u32, Access::ro, 4, "Control cycles until a trial reverts"},
+    {status_summary, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {status_summary, 1, Type::u16, Access::ro, 2, "State of the parameter store"},
+    {status_summary, 2, Type::u16, Access::ro, 2, "Answer to the last command"},
+    {status_summary, 3, Type::u16, Access::ro, 2, "Refusal of the last command"},
+    {status_summary, 4, Type::u16, Access::ro, 2, "Faults"},
+    {status_summary, 5, Type::u32, Access::ro, 4, "Sequence of the active set"},
+    {status_summary, 6, Type::u32, Access::ro, 4, "Detail"},
+    {status_summary, 7, Type::u32, Access::ro, 4, "Control cycles until a trial reverts"},
     {robot, 0, Type::domain, Access::ro, robot_record_bytes, "Robot record"},
     {image, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {image, image_staging, Type::domain, Access::wo, 0, "Parameter image into staging"},
@@ -81,18 +83,19 @@ constexpr Object objects[] = {
     {probe, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {probe, probe_request, Type::domain, Access::rw, probe_request_bytes, "Probe request record"},
     {probe, probe_response, Type::domain, Access::ro, probe_response_bytes, "Probe response record"},
-    {people, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
-    {people, 1, Type::real32, Access::ro, 4, "Correction of joint 1 in the last cycle, deg"},
-    {people, 2, Type::real32, Access::ro, 4, "Correction of joint 2 in the last cycle, deg"},
-    {people, 3, Type::real32, Access::ro, 4, "Correction of joint 3 in the last cycle, deg"},
-    {people, 4, Type::real32, Access::ro, 4, "Correction of joint 4 in the last cycle, deg"},
-    {people, 5, Type::real32, Access::ro, 4, "Correction of joint 5 in the last cycle, deg"},
-    {people, 6, Type::real32, Access::ro, 4, "Correction of joint 6 in the last cycle, deg"},
-    {people, 7, Type::real32, Access::ro, 4, "Largest correction of any joint since the start, deg"},
+    {corrections, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {corrections, 1, Type::real32, Access::ro, 4, "Correction of joint 1 in the last cycle, deg"},
+    {corrections, 2, Type::real32, Access::ro, 4, "Correction of joint 2 in the last cycle, deg"},
+    {corrections, 3, Type::real32, Access::ro, 4, "Correction of joint 3 in the last cycle, deg"},
+    {corrections, 4, Type::real32, Access::ro, 4, "Correction of joint 4 in the last cycle, deg"},
+    {corrections, 5, Type::real32, Access::ro, 4, "Correction of joint 5 in the last cycle, deg"},
+    {corrections, 6, Type::real32, Access::ro, 4, "Correction of joint 6 in the last cycle, deg"},
+    {corrections, 7, Type::real32, Access::ro, 4, "Largest correction of any joint since the start, deg"},
 };
+/// Number of entries of `objects`.
 constexpr std::size_t object_count = sizeof objects / sizeof objects[0];
 
-/// What an object that has sub-indices is called.
+/// Name in the EDS of an object that has sub-indices.
 constexpr const char* record_name(std::uint16_t index) {
   switch (index) {
     case store_parameters:
@@ -103,7 +106,7 @@ constexpr const char* record_name(std::uint16_t index) {
       return "Identity object";
     case sdo_server:
       return "SDO server parameter";
-    case status_for_people:
+    case status_summary:
       return "Status for people";
     case image:
       return "Parameter image";
@@ -111,7 +114,7 @@ constexpr const char* record_name(std::uint16_t index) {
       return "Command";
     case probe:
       return "Probe";
-    case people:
+    case corrections:
       return "Corrections for people";
     default:
       return "";

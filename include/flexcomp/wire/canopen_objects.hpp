@@ -23,7 +23,7 @@
 ///              2  UNSIGNED32      ro      COB-ID of answers, 0x580 + node
 ///     0x2000   0  DOMAIN          ro      capability record
 ///     0x2001   0  DOMAIN          ro      status record
-///     0x2002   0  UNSIGNED8       const   7: the status for people
+///     0x2002   0  UNSIGNED8       const   7: status as single values
 ///              1  UNSIGNED16      ro      state (wire::StoreState)
 ///              2  UNSIGNED16      ro      answer to the last command (wire::Answer)
 ///              3  UNSIGNED16      ro      refusal of the last command (flexcomp::Refusal)
@@ -41,13 +41,13 @@
 ///     0x2020   0  UNSIGNED8       const   2
 ///              1  DOMAIN          rw      probe request record; its download answers it
 ///              2  DOMAIN          ro      probe response record
-///     0x2021   0  UNSIGNED8       const   7: for people
+///     0x2021   0  UNSIGNED8       const   7: corrections
 ///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
 ///              7  REAL32          ro      largest correction of any joint since the start, deg
 ///
-/// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length, otherwise
-///   the length is known at the end. It goes to staging only; an aborted or timed-out transfer leaves nothing
-///   behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
+/// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length,
+///   otherwise the length is known at the end. It goes to staging only; an aborted or timed-out transfer
+///   leaves nothing behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
 /// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by the fade-in,
 ///   because between the two a controller would run a set that it can no longer read back.
@@ -65,84 +65,85 @@ namespace flexcomp {
 namespace wire {
 namespace canopen {
 
-constexpr std::uint16_t device_type = 0x1000;
-constexpr std::uint16_t error_register = 0x1001;
-constexpr std::uint16_t device_name = 0x1008;
-constexpr std::uint16_t software_version = 0x100A;
-constexpr std::uint16_t store_parameters = 0x1010;
-constexpr std::uint16_t restore_parameters = 0x1011;
-constexpr std::uint16_t heartbeat_time = 0x1017;
-constexpr std::uint16_t identity = 0x1018;
-constexpr std::uint16_t sdo_server = 0x1200;
-constexpr std::uint16_t capability = 0x2000;
-constexpr std::uint16_t status = 0x2001;
-constexpr std::uint16_t status_for_people = 0x2002;
-constexpr std::uint16_t image = 0x2010;
-constexpr std::uint8_t image_staging = 1;
-constexpr std::uint8_t image_active = 2;
-constexpr std::uint16_t command = 0x2011;
-constexpr std::uint8_t command_argument = 1;
-constexpr std::uint8_t command_number = 2;
-constexpr std::uint16_t probe = 0x2020;
-constexpr std::uint8_t probe_request = 1;
-constexpr std::uint8_t probe_response = 2;
-constexpr std::uint16_t people = 0x2021;
+// Indices of objects; see the table at the top.
+constexpr std::uint16_t device_type = 0x1000;         ///< CiA 301, 7.5.2.1
+constexpr std::uint16_t error_register = 0x1001;      ///< CiA 301, 7.5.2.2
+constexpr std::uint16_t device_name = 0x1008;         ///< CiA 301, 7.5.2.8
+constexpr std::uint16_t software_version = 0x100A;    ///< CiA 301, 7.5.2.10
+constexpr std::uint16_t store_parameters = 0x1010;    ///< CiA 301, 7.5.2.13
+constexpr std::uint16_t restore_parameters = 0x1011;  ///< CiA 301, 7.5.2.14
+constexpr std::uint16_t heartbeat_time = 0x1017;      ///< CiA 301, 7.5.2.20
+constexpr std::uint16_t identity = 0x1018;            ///< CiA 301, 7.5.2.21
+constexpr std::uint16_t sdo_server = 0x1200;          ///< CiA 301, 7.5.2.33
+constexpr std::uint16_t capability = 0x2000;          ///< capability record
+constexpr std::uint16_t status = 0x2001;              ///< status record
+constexpr std::uint16_t status_summary = 0x2002;      ///< status as single values
+constexpr std::uint16_t image = 0x2010;               ///< parameter image
+constexpr std::uint8_t image_staging = 1;             ///< sub-index: image into staging
+constexpr std::uint8_t image_active = 2;              ///< sub-index: active image
+constexpr std::uint16_t command = 0x2011;             ///< command and its argument
+constexpr std::uint8_t command_argument = 1;          ///< sub-index: argument of the next command
+constexpr std::uint8_t command_number = 2;            ///< sub-index: command
+constexpr std::uint16_t probe = 0x2020;               ///< probe request and response
+constexpr std::uint8_t probe_request = 1;             ///< sub-index: request record
+constexpr std::uint8_t probe_response = 2;            ///< sub-index: response record
+constexpr std::uint16_t corrections = 0x2021;         ///< of the last control cycle
 
 constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2.13
 constexpr std::uint32_t load_signature = 0x64616F6C;  ///< "load", CiA 301 7.5.2.14
 constexpr std::uint32_t product_code = 0x464C5831;    ///< "FLX1"
 
 // COB-IDs of the pre-defined connection set (CiA 301, 7.3.5).
-constexpr std::uint16_t nmt_id = 0x000;
+constexpr std::uint16_t nmt_id = 0x000;          ///< NMT commands, from the master
 constexpr std::uint16_t sdo_answer_id = 0x580;   ///< + node, server to client
 constexpr std::uint16_t sdo_request_id = 0x600;  ///< + node, client to server
 constexpr std::uint16_t heartbeat_id = 0x700;    ///< + node
 
 /// NMT commands (CiA 301, 7.2.8.3.1).
 enum class NmtCommand : std::uint8_t {
-  start = 1,
-  stop = 2,
-  enter_pre_operational = 128,
-  reset_node = 129,
-  reset_communication = 130,
+  start = 1,                    ///< enter operational
+  stop = 2,                     ///< enter stopped
+  enter_pre_operational = 128,  ///< enter pre-operational
+  reset_node = 129,             ///< reset the node
+  reset_communication = 130,    ///< reset its communication
 };
 
 /// NMT states as in the heartbeat (CiA 301, 7.2.8.3.2.2).
 enum class NmtState : std::uint8_t {
-  initialising = 0,  ///< also the boot-up message
-  stopped = 4,
-  operational = 5,
-  pre_operational = 127,
+  initialising = 0,       ///< also the boot-up message
+  stopped = 4,            ///< no SDO
+  operational = 5,        ///< SDO is served
+  pre_operational = 127,  ///< SDO is served
 };
 
 /// SDO abort codes (CiA 301, table 22).
 namespace abort {
-constexpr std::uint32_t none = 0;
-constexpr std::uint32_t toggle = 0x05030000;
-constexpr std::uint32_t timeout = 0x05040000;
-constexpr std::uint32_t command = 0x05040001;
-constexpr std::uint32_t out_of_memory = 0x05040005;
-constexpr std::uint32_t write_only = 0x06010001;
-constexpr std::uint32_t read_only = 0x06010002;
-constexpr std::uint32_t no_object = 0x06020000;
-constexpr std::uint32_t incompatible = 0x06040043;
-constexpr std::uint32_t hardware = 0x06060000;
-constexpr std::uint32_t length = 0x06070010;
-constexpr std::uint32_t too_long = 0x06070012;
-constexpr std::uint32_t too_short = 0x06070013;
-constexpr std::uint32_t no_sub_index = 0x06090011;
-constexpr std::uint32_t value = 0x06090030;
-constexpr std::uint32_t value_too_high = 0x06090031;
-constexpr std::uint32_t value_too_low = 0x06090032;
-constexpr std::uint32_t busy = 0x060A0023;
-constexpr std::uint32_t general = 0x08000000;
-constexpr std::uint32_t not_stored = 0x08000020;
-constexpr std::uint32_t local_control = 0x08000021;
-constexpr std::uint32_t device_state = 0x08000022;
-constexpr std::uint32_t no_data = 0x08000024;
+constexpr std::uint32_t none = 0;                     ///< no abort
+constexpr std::uint32_t toggle = 0x05030000;          ///< toggle bit not alternated
+constexpr std::uint32_t timeout = 0x05040000;         ///< SDO protocol timed out
+constexpr std::uint32_t command = 0x05040001;         ///< command specifier not valid or unknown
+constexpr std::uint32_t out_of_memory = 0x05040005;   ///< out of memory
+constexpr std::uint32_t write_only = 0x06010001;      ///< attempt to read a write-only object
+constexpr std::uint32_t read_only = 0x06010002;       ///< attempt to write a read-only object
+constexpr std::uint32_t no_object = 0x06020000;       ///< object does not exist
+constexpr std::uint32_t incompatible = 0x06040043;    ///< general parameter incompatibility
+constexpr std::uint32_t hardware = 0x06060000;        ///< access failed due to a hardware error
+constexpr std::uint32_t length = 0x06070010;          ///< length of service parameter does not match
+constexpr std::uint32_t too_long = 0x06070012;        ///< length of service parameter too high
+constexpr std::uint32_t too_short = 0x06070013;       ///< length of service parameter too low
+constexpr std::uint32_t no_sub_index = 0x06090011;    ///< sub-index does not exist
+constexpr std::uint32_t value = 0x06090030;           ///< invalid value for parameter
+constexpr std::uint32_t value_too_high = 0x06090031;  ///< value of parameter too high
+constexpr std::uint32_t value_too_low = 0x06090032;   ///< value of parameter too low
+constexpr std::uint32_t busy = 0x060A0023;            ///< resource not available
+constexpr std::uint32_t general = 0x08000000;         ///< general error
+constexpr std::uint32_t not_stored = 0x08000020;      ///< data cannot be transferred or stored
+constexpr std::uint32_t local_control = 0x08000021;   ///< the same because of local control
+constexpr std::uint32_t device_state = 0x08000022;    ///< the same because of the present device state
+constexpr std::uint32_t no_data = 0x08000024;         ///< no data available
 }  // namespace abort
 
-/// The abort code that says a refusal on this bus.
+/// SDO abort code of a refusal.
 inline std::uint32_t abort_code(Refusal refusal) {
   switch (refusal) {
     case Refusal::none:
@@ -176,7 +177,7 @@ inline std::uint32_t abort_code(Refusal refusal) {
   return abort::general;
 }
 
-/// The abort code that says the answer to a command on this bus; `refusal` where the answer is `refused`.
+/// SDO abort code of an answer to a command, or of `refusal` where the answer is `refused`.
 inline std::uint32_t abort_code(Answer answer, Refusal refusal) {
   switch (answer) {
     case Answer::accepted:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The Modbus register map as a table: every block with its place, access and name, the one home of what modbus_map.hpp
-/// explains. The firmware serves it, the host writes it as a file.
+/// The Modbus register map of modbus_map.hpp as a table: address, length, access and name of every block. The
+/// firmware serves it, the host writes it to a file.
 #ifndef FLEXCOMP_WIRE_MODBUS_BLOCKS_HPP
 #define FLEXCOMP_WIRE_MODBUS_BLOCKS_HPP
 
@@ -15,32 +15,35 @@ namespace flexcomp {
 namespace wire {
 namespace modbus {
 
+/// Blocks of registers; not on the wire.
 enum class Block : std::uint8_t {
-  capability,
-  status,
-  argument,
-  command,
-  staging_offset,
-  staging_window,
-  reading_offset,
-  reading_window,
-  probe_request,
-  probe_trigger,
-  probe_response,
-  people,
-  robot,
+  capability,      ///< capability record
+  status,          ///< status record
+  argument,        ///< of the next command
+  command,         ///< runs where it is written
+  staging_offset,  ///< bytes
+  staging_window,  ///< image bytes from that offset
+  reading_offset,  ///< bytes
+  reading_window,  ///< active image from that offset
+  probe_request,   ///< probe request record
+  probe_trigger,   ///< answers the request
+  probe_response,  ///< probe response record
+  corrections,     ///< of the last control cycle, binary32
+  robot,           ///< robot record
 };
 
+/// One block of the map.
 struct BlockDescription {
-  Block block;
-  std::uint16_t address;
-  std::uint16_t registers;
-  bool readable;
-  bool writable;
-  const char* name;
-  const char* text;  ///< for people
+  Block block;              ///< which one
+  std::uint16_t address;    ///< of the PDU, from 0
+  std::uint16_t registers;  ///< length
+  bool readable;            ///< by functions 03, 04 and 23
+  bool writable;            ///< by functions 06, 16 and 23
+  const char* name;         ///< in the exported map
+  const char* text;         ///< description in the exported map
 };
 
+/// All blocks, by address.
 constexpr BlockDescription block_descriptions[] = {
     {Block::capability, capability, capability_registers, true, false, "capability",
      "what the controller is and holds"},
@@ -62,10 +65,11 @@ constexpr BlockDescription block_descriptions[] = {
      "1 answers the request, 2 its joint command with the robot's default context"},
     {Block::probe_response, probe_response, probe_response_registers, true, false, "probe_response",
      "the corrected command"},
-    {Block::people, people, people_registers, true, false, "people",
+    {Block::corrections, corrections, corrections_registers, true, false, "people",
      "corrections of the last control cycle, and the largest since the start"},
     {Block::robot, robot, robot_registers, true, false, "robot", "the nominal robot"},
 };
+/// Number of blocks.
 constexpr std::size_t block_count = sizeof block_descriptions / sizeof block_descriptions[0];
 
 }  // namespace modbus

@@ -16,7 +16,7 @@
 ///     0x036C         1    rw      probe trigger: writing 1 answers the request, 2 answers its joint command
 ///                                 with the robot's default context
 ///     0x0380        36    r       probe response record
-///     0x0400        14    r       floats for people, binary32 "ABCD": correction of joints 1 … 6 in the
+///     0x0400        14    r       corrections, binary32 "ABCD": correction of joints 1 … 6 in the
 ///                                 last control cycle, then the largest of any joint since the start (deg)
 ///     0x0500       288    r       robot record (robot_record.hpp)
 ///
@@ -46,46 +46,46 @@ namespace flexcomp {
 namespace wire {
 namespace modbus {
 
-constexpr std::uint16_t capability = 0x0000;
-constexpr std::uint16_t capability_registers = capability_bytes / 2;
-constexpr std::uint16_t status = 0x0040;
-constexpr std::uint16_t status_registers = status_bytes / 2;
-constexpr std::uint16_t argument = 0x00A0;
-constexpr std::uint16_t command = 0x00A2;
-constexpr std::uint16_t staging_offset = 0x0100;
-constexpr std::uint16_t staging_window = 0x0102;
-constexpr std::uint16_t staging_window_registers = 121;
-constexpr std::uint16_t reading_offset = 0x0200;
-constexpr std::uint16_t reading_window = 0x0202;
-constexpr std::uint16_t reading_window_registers = 123;
-constexpr std::uint16_t probe_request = 0x0300;
-constexpr std::uint16_t probe_request_registers = probe_request_bytes / 2;
-constexpr std::uint16_t probe_trigger = 0x036C;
-constexpr std::uint16_t probe_response = 0x0380;
-constexpr std::uint16_t probe_response_registers = probe_response_bytes / 2;
-constexpr std::uint16_t people = 0x0400;
-constexpr std::uint16_t people_registers = 14;
+constexpr std::uint16_t capability = 0x0000;                          ///< capability record, read only
+constexpr std::uint16_t capability_registers = capability_bytes / 2;  ///< its length
+constexpr std::uint16_t status = 0x0040;                              ///< status record, read only
+constexpr std::uint16_t status_registers = status_bytes / 2;          ///< its length
+constexpr std::uint16_t argument = 0x00A0;                            ///< argument of the next command, u32
+constexpr std::uint16_t command = 0x00A2;                             ///< command; writing it runs it
+constexpr std::uint16_t staging_offset = 0x0100;         ///< offset of the staging window, u32, bytes
+constexpr std::uint16_t staging_window = 0x0102;         ///< image bytes, write only
+constexpr std::uint16_t staging_window_registers = 121;  ///< its length
+constexpr std::uint16_t reading_offset = 0x0200;         ///< offset of the reading window, u32, bytes
+constexpr std::uint16_t reading_window = 0x0202;         ///< bytes of the active image, read only
+constexpr std::uint16_t reading_window_registers = 123;  ///< its length
+constexpr std::uint16_t probe_request = 0x0300;          ///< probe request record
+constexpr std::uint16_t probe_request_registers = probe_request_bytes / 2;  ///< its length
+constexpr std::uint16_t probe_trigger = 0x036C;   ///< trigger_request or trigger_default_context
+constexpr std::uint16_t probe_response = 0x0380;  ///< probe response record, read only
+constexpr std::uint16_t probe_response_registers = probe_response_bytes / 2;  ///< its length
+constexpr std::uint16_t corrections = 0x0400;        ///< corrections of the last control cycle, read only
+constexpr std::uint16_t corrections_registers = 14;  ///< its length
 
 constexpr std::uint16_t trigger_request = 1;          ///< answers the whole probe request
 constexpr std::uint16_t trigger_default_context = 2;  ///< answers its q with the robot's default context
 
-/// Limits of V1.1b3, clauses 6.3, 6.4, 6.12 and 6.17.
+/// Registers read by one request of function 03, 04 or 23 (6.3, 6.4, 6.17).
 constexpr std::uint16_t most_read = 125;
-constexpr std::uint16_t most_written = 123;
-constexpr std::uint16_t most_written_by_23 = 121;
-constexpr std::size_t pdu_bytes = 253;
-constexpr std::size_t rtu_bytes = 256;
-constexpr std::size_t tcp_bytes = 260;
-constexpr std::uint16_t default_tcp_port = 502;
+constexpr std::uint16_t most_written = 123;        ///< registers written by one request of function 16 (6.12)
+constexpr std::uint16_t most_written_by_23 = 121;  ///< registers written by one request of function 23 (6.17)
+constexpr std::size_t pdu_bytes = 253;             ///< largest PDU (4.1)
+constexpr std::size_t rtu_bytes = 256;             ///< largest RTU frame: unit, PDU, CRC-16 (4.1)
+constexpr std::size_t tcp_bytes = 260;             ///< largest TCP frame: MBAP header, PDU (4.1)
+constexpr std::uint16_t default_tcp_port = 502;    ///< registered with IANA
 
 /// Exception codes, V1.1b3 clause 7.
 enum class Exception : std::uint8_t {
-  none = 0,
-  illegal_function = 1,
-  illegal_data_address = 2,
-  illegal_data_value = 3,
-  server_device_failure = 4,
-  server_device_busy = 6,
+  none = 0,                   ///< answered without exception; not on the wire
+  illegal_function = 1,       ///< 01: function code not known
+  illegal_data_address = 2,   ///< 02: registers that do not exist
+  illegal_data_value = 3,     ///< 03: quantity or length is wrong
+  server_device_failure = 4,  ///< 04: refused; the status record says why
+  server_device_busy = 6,     ///< 06: busy
 };
 
 }  // namespace modbus

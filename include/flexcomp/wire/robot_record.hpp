@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which arm a controller was built for: its nominal robot and name as one record, so that a set can be pushed
-/// and pulled with nothing but the bus at hand. The hashes of the capability record prove it.
+/// The nominal robot and name of a controller as one record, so that a set can be pushed and pulled without a
+/// robot file. The hashes of the capability record confirm it.
 ///
 ///     robot record, 576 bytes
 ///       0 f64 x 5 x 6 links: theta_rad, d_m, a_m, alpha_rad, beta_rad of link 1, then of link 2 …
@@ -32,21 +32,21 @@
 namespace flexcomp {
 namespace wire {
 
-constexpr std::size_t robot_record_bytes = 576;
-constexpr std::size_t robot_name_bytes = 118;
+constexpr std::size_t robot_record_bytes = 576;  ///< size of the record
+constexpr std::size_t robot_name_bytes = 118;    ///< longest name in it
 
 namespace modbus {
-constexpr std::uint16_t robot = 0x0500;
-constexpr std::uint16_t robot_registers = robot_record_bytes / 2;
+constexpr std::uint16_t robot = 0x0500;                            ///< robot record, read only
+constexpr std::uint16_t robot_registers = robot_record_bytes / 2;  ///< its length
 }  // namespace modbus
 
 namespace canopen {
-constexpr std::uint16_t robot = 0x2003;
+constexpr std::uint16_t robot = 0x2003;  ///< robot record
 }  // namespace canopen
 
 namespace detail {
 
-/// Walks over the reals of the record in the order of the table above. The one place that knows it.
+/// Visits the reals of the record in the order of the table above.
 template <class Robot, class Visitor>
 void visit_robot(Robot& r, Visitor&& v) {
   for (auto& link : r.links) {

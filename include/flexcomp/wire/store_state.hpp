@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What controller and host say to each other about the parameter store, the same on every bus: the numbers
-/// of states, commands and answers, and four records. How a bus carries them is in modbus_map.hpp and
-/// canopen_objects.hpp.
+/// Protocol of the parameter store, the same on every bus: numbers of states, commands and answers, and four
+/// records. modbus_map.hpp and canopen_objects.hpp have their places on a bus.
 ///
 /// A record is a sequence of fields without gaps, every field an even number of bytes. On Modbus a field is
 /// big-endian in consecutive registers (a binary64 takes four, most significant first, "ABCD EFGH"); on
@@ -40,7 +39,8 @@
 ///     120 f64 x 6 direction of joint (+1, -1, 0)
 ///     168 f64 x 6 relative speed of joint
 ///
-/// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are 0.
+/// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are
+/// 0.
 ///
 /// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). Commands
 /// that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
@@ -58,11 +58,12 @@
 namespace flexcomp {
 namespace wire {
 
-/// What this header describes. A host refuses another major number; a higher minor number only adds.
+/// Version of this protocol. A host refuses another major number; a higher minor number only adds.
 constexpr std::uint16_t protocol_version = 0x0100;
+/// Joints of an arm in the records.
 constexpr std::size_t joints = 6;
 
-/// The store, as seen by whoever brings a set. Numbers are on the wire: add, never change.
+/// State of the parameter store. Numbers are on the wire: add, never change.
 enum class StoreState : std::uint16_t {
   idle = 0,       ///< nothing staged
   receiving = 1,  ///< bytes are coming in
@@ -73,34 +74,33 @@ enum class StoreState : std::uint16_t {
 
 /// Commands, with their argument (u32; 0 where none is named). Numbers are on the wire: add, never change.
 enum class Command : std::uint16_t {
-  none = 0,
-  begin = 1,   ///< announces an image; argument: its length in bytes
-  verify = 2,  ///< checks the staged image and prepares it
-  commit =
-      3,  ///< writes it to the inactive slot and makes it active (verifies first where that was left out)
+  none = 0,          ///< does nothing
+  begin = 1,         ///< announces an image; argument: its length in bytes
+  verify = 2,        ///< checks the staged image and prepares it
+  commit = 3,        ///< writes it to the inactive slot and activates it; verifies first where needed
   commit_trial = 4,  ///< the same, but reverts unless confirmed; argument: control cycles, 0 = as configured
   confirm = 5,       ///< makes the set on trial permanent
-  rollback = 6,      ///< back to the set in the other slot (or out of the trial); the dropped slot is erased
-  abort = 7,         ///< drops what is staged
+  rollback = 6,      ///< activates the set in the other slot, or ends the trial; the slot left is erased
+  abort = 7,         ///< discards what is staged
   restore_defaults = 8,  ///< erases both slots; commands are passed through from then on
 };
 
 /// How the last command ended. Numbers are on the wire: add, never change.
 enum class Answer : std::uint16_t {
-  accepted = 0,
+  accepted = 0,     ///< done, or being worked on
   refused = 1,      ///< the image was refused; `refusal` says why
   wrong_state = 2,  ///< not in this state of the store
-  busy = 3,  ///< another client's transfer, a write in progress, or the cycle has not taken the last set yet
-  not_authorised = 4,  ///< by local control
-  storage_failed = 5,  ///< non-volatile memory could not be erased, written or read back
-  incomplete = 6,      ///< fewer bytes were staged than announced; detail: how many
-  no_previous = 7,     ///< nothing to roll back to
-  unknown_command = 8,
-  bad_argument = 9,  ///< length 0, or bytes that leave a gap or exceed the announced length
-  reverted = 10,     ///< the trial ran out before it was confirmed
+  busy = 3,  ///< transfer of another client, write in progress, or the cycle has not taken the last set yet
+  not_authorised = 4,   ///< by local control
+  storage_failed = 5,   ///< non-volatile memory could not be erased, written or read back
+  incomplete = 6,       ///< fewer bytes were staged than announced; detail: how many
+  no_previous = 7,      ///< nothing to roll back to
+  unknown_command = 8,  ///< not a Command
+  bad_argument = 9,     ///< length 0, or bytes that leave a gap or exceed the announced length
+  reverted = 10,        ///< the trial ran out before it was confirmed
 };
 
-/// Bits of the status field `faults`: what a technician should know, none of them stops the robot.
+/// Bits of the status field `faults`. None of them stops the robot.
 namespace fault {
 constexpr std::uint16_t no_valid_set = 1;  ///< no slot held a set that this controller accepts: pass-through
 constexpr std::uint16_t older_slot = 2;    ///< the newest slot was damaged or refused; the other one runs
@@ -108,83 +108,87 @@ constexpr std::uint16_t storage = 4;       ///< non-volatile memory failed to re
 constexpr std::uint16_t trial_reverted = 8;  ///< a set on trial was not confirmed in time
 }  // namespace fault
 
+/// Slot of a set that is in none.
 constexpr std::uint16_t no_slot = 0xFFFF;
 
-/// What the controller is and holds; see the table at the top.
+/// Capability record, 128 bytes: identity and limits of the controller; see the table at the top.
 struct Capability {
-  std::uint16_t protocol = protocol_version;
-  std::uint16_t joints = 0;
-  std::uint16_t scalar_bytes = 0;
-  std::uint16_t schema = 0;
-  std::uint32_t bases = 0;
-  std::uint32_t flags = 0;
-  std::uint16_t terms = 0;
-  std::uint16_t tables = 0;
-  std::uint32_t values = 0;
-  std::uint32_t image_bytes = 0;
-  std::uint32_t cycle_us = 0;
-  std::uint32_t fade_cycles = 0;
-  std::uint32_t firmware = 0;
-  std::array<std::uint8_t, 32> nominal_hash{};
-  std::array<std::uint8_t, 32> name_hash{};
+  std::uint16_t protocol = protocol_version;    ///< major << 8 | minor
+  std::uint16_t joints = 0;                     ///< of the arm
+  std::uint16_t scalar_bytes = 0;               ///< 4 float, 8 double
+  std::uint16_t schema = 0;                     ///< of images, major << 8 | minor
+  std::uint32_t bases = 0;                      ///< bit 1 << id of Basis
+  std::uint32_t flags = 0;                      ///< 0
+  std::uint16_t terms = 0;                      ///< that are not constant
+  std::uint16_t tables = 0;                     ///< most tables
+  std::uint32_t values = 0;                     ///< most table values
+  std::uint32_t image_bytes = 0;                ///< longest image
+  std::uint32_t cycle_us = 0;                   ///< period of the control cycle
+  std::uint32_t fade_cycles = 0;                ///< of the fade-in (C19)
+  std::uint32_t firmware = 0;                   ///< major << 16 | minor << 8 | patch
+  std::array<std::uint8_t, 32> nominal_hash{};  ///< of the geometry
+  std::array<std::uint8_t, 32> name_hash{};     ///< of the robot's name
   std::uint64_t plausible_position_m = 0;       ///< binary64 bits
   std::uint64_t plausible_orientation_rad = 0;  ///< binary64 bits
   std::uint64_t largest_correction_rad = 0;     ///< binary64 bits
 };
-constexpr std::size_t capability_bytes = 128;
+constexpr std::size_t capability_bytes = 128;  ///< size of the capability record
 
-/// What the store and the control cycle are doing; see the table at the top.
+/// Status record, 96 bytes: state of store and control cycle; see the table at the top.
 struct Status {
-  std::uint16_t state = 0;
-  std::uint16_t answer = 0;
-  std::uint16_t refusal = 0;
-  std::uint16_t faults = 0;
-  std::uint32_t detail = 0;
-  std::uint16_t active_slot = no_slot;
-  std::uint16_t settled = 0;
-  std::uint32_t active_sequence = 0;
-  std::uint32_t active_bytes = 0;
-  std::uint32_t active_crc = 0;
-  std::uint32_t previous_sequence = 0;
-  std::uint32_t announced_bytes = 0;
-  std::uint32_t staged_bytes = 0;
-  std::uint32_t trial_cycles_left = 0;
-  std::uint32_t cycles = 0;
-  std::array<std::uint32_t, 6> cycles_by_status{};
-  std::uint16_t last_status = 0;
+  std::uint16_t state = 0;                          ///< StoreState
+  std::uint16_t answer = 0;                         ///< Answer to the last command
+  std::uint16_t refusal = 0;                        ///< Refusal of the last command
+  std::uint16_t faults = 0;                         ///< bits of namespace fault
+  std::uint32_t detail = 0;                         ///< of the refusal or answer
+  std::uint16_t active_slot = no_slot;              ///< 0, 1 or no_slot
+  std::uint16_t settled = 0;                        ///< 1: the cycle runs what is requested
+  std::uint32_t active_sequence = 0;                ///< 0: none
+  std::uint32_t active_bytes = 0;                   ///< of the active image
+  std::uint32_t active_crc = 0;                     ///< CRC-32 of the active image
+  std::uint32_t previous_sequence = 0;              ///< that rollback returns to, 0: none
+  std::uint32_t announced_bytes = 0;                ///< of the staged image
+  std::uint32_t staged_bytes = 0;                   ///< so far
+  std::uint32_t trial_cycles_left = 0;              ///< 0: no trial
+  std::uint32_t cycles = 0;                         ///< since the start, wraps
+  std::array<std::uint32_t, 6> cycles_by_status{};  ///< by StepStatus, wrap
+  std::uint16_t last_status = 0;                    ///< StepStatus of the last cycle
 };
-constexpr std::size_t status_bytes = 96;
+constexpr std::size_t status_bytes = 96;  ///< size of the status record
 
-/// One joint command and its context, as binary64 bits.
+/// Probe request record, 216 bytes: a joint command and its context; reals as binary64 bits.
 struct ProbeRequest {
-  std::array<std::uint64_t, joints> q_rad{};
-  std::uint64_t payload_kg = 0;
-  std::array<std::uint64_t, 3> payload_com_m{};
-  std::array<std::uint64_t, 3> force_n{};
-  std::uint64_t temperature_c = 0;
-  std::uint64_t time_s = 0;
-  std::array<std::uint64_t, joints> direction{};
-  std::array<std::uint64_t, joints> relative_speed{};
+  std::array<std::uint64_t, joints> q_rad{};           ///< joint command
+  std::uint64_t payload_kg = 0;                        ///< mass of the payload
+  std::array<std::uint64_t, 3> payload_com_m{};        ///< its centre of mass in F6
+  std::array<std::uint64_t, 3> force_n{};              ///< external, in F0
+  std::uint64_t temperature_c = 0;                     ///< of the arm
+  std::uint64_t time_s = 0;                            ///< as in Context
+  std::array<std::uint64_t, joints> direction{};       ///< +1, -1 or 0 of each joint
+  std::array<std::uint64_t, joints> relative_speed{};  ///< of each joint
 };
-constexpr std::size_t probe_request_bytes = 216;
+constexpr std::size_t probe_request_bytes = 216;  ///< size of the probe request record
 
-/// What the controller answers; reals as binary64 bits.
+/// Probe response record, 72 bytes: the corrected command; reals as binary64 bits.
 struct ProbeResponse {
-  std::array<std::uint64_t, joints> q_rad{};
-  std::uint64_t position_m = 0;
-  std::uint64_t orientation_rad = 0;
-  std::uint16_t status = 0;
-  std::uint16_t slot = no_slot;
-  std::uint32_t sequence = 0;
+  std::array<std::uint64_t, joints> q_rad{};  ///< corrected joint command
+  std::uint64_t position_m = 0;               ///< remaining error
+  std::uint64_t orientation_rad = 0;          ///< remaining error
+  std::uint16_t status = 0;                   ///< StepStatus
+  std::uint16_t slot = no_slot;               ///< of the set that answered, or no_slot
+  std::uint32_t sequence = 0;                 ///< of that set, 0: none
 };
-constexpr std::size_t probe_response_bytes = 72;
+constexpr std::size_t probe_response_bytes = 72;  ///< size of the probe response record
 
-/// The order of the bytes of a field: CANopen little, Modbus big.
-enum class ByteOrder { little, big };
+/// Order of the bytes of a field.
+enum class ByteOrder {
+  little,  ///< CANopen
+  big      ///< Modbus
+};
 
 namespace detail {
 
-/// Walks over the fields of a record in the order of the tables above. The one place that knows it.
+/// Visits the fields of a record in the order of the tables above.
 template <class Record, class Visitor>
 void visit_capability(Record& r, Visitor&& v) {
   v(r.protocol), v(r.joints), v(r.scalar_bytes), v(r.schema), v(r.bases), v(r.flags), v(r.terms), v(r.tables);
@@ -267,35 +271,41 @@ class Reader {
 
 }  // namespace detail
 
-/// Writes a record into `out`, which holds at least the record's number of bytes.
+/// Writes a record into `out`, of at least capability_bytes.
 inline void encode(const Capability& r, ByteOrder order, std::uint8_t* out) {
   detail::visit_capability(r, detail::Writer(out, order));
 }
+/// Writes a record into `out`, of at least status_bytes.
 inline void encode(const Status& r, ByteOrder order, std::uint8_t* out) {
   detail::visit_status(r, detail::Writer(out, order));
 }
+/// Writes a record into `out`, of at least probe_request_bytes.
 inline void encode(const ProbeRequest& r, ByteOrder order, std::uint8_t* out) {
   detail::visit_probe_request(r, detail::Writer(out, order));
 }
+/// Writes a record into `out`, of at least probe_response_bytes.
 inline void encode(const ProbeResponse& r, ByteOrder order, std::uint8_t* out) {
   detail::visit_probe_response(r, detail::Writer(out, order));
 }
 
-/// Reads a record from `in`, which holds at least the record's number of bytes.
+/// Reads a record from `in`, of at least capability_bytes.
 inline void decode(const std::uint8_t* in, ByteOrder order, Capability& r) {
   detail::visit_capability(r, detail::Reader(in, order));
 }
+/// Reads a record from `in`, of at least status_bytes.
 inline void decode(const std::uint8_t* in, ByteOrder order, Status& r) {
   detail::visit_status(r, detail::Reader(in, order));
 }
+/// Reads a record from `in`, of at least probe_request_bytes.
 inline void decode(const std::uint8_t* in, ByteOrder order, ProbeRequest& r) {
   detail::visit_probe_request(r, detail::Reader(in, order));
 }
+/// Reads a record from `in`, of at least probe_response_bytes.
 inline void decode(const std::uint8_t* in, ByteOrder order, ProbeResponse& r) {
   detail::visit_probe_response(r, detail::Reader(in, order));
 }
 
-/// One sentence for people, without a full stop.
+/// Message in English, lower case, without a full stop.
 inline const char* text(Answer a) {
   switch (a) {
     case Answer::accepted:
@@ -324,6 +334,7 @@ inline const char* text(Answer a) {
   return "unknown answer";
 }
 
+/// Lower-case name of a state.
 inline const char* name(StoreState s) {
   switch (s) {
     case StoreState::idle:
