@@ -17,7 +17,7 @@ uint32_t board_now_ms(void);
 /* 1 once for each control period that has begun, else 0. Periods that could not be served are left out. */
 int board_cycle_due(void);
 
-/* Puts a data frame into the transmit FIFO. 0 where it has no room; the CANopen node offers it again. */
+/* Puts a data frame into the transmit FIFO. 0 where it is full; the CANopen node offers it again. */
 int board_can_send(void* user, uint16_t id, const uint8_t* bytes, uint8_t size);
 
 typedef struct board_can_frame {
@@ -29,7 +29,7 @@ typedef struct board_can_frame {
 /* Takes the oldest frame out of the receive FIFO. 0 where there is none. */
 int board_can_receive(board_can_frame* frame);
 
-/* How often the receive FIFO had no room for a frame since the start. */
+/* Frames lost by a full receive FIFO since the start. */
 uint32_t board_can_overflows(void);
 
 /* The two slots of non-volatile memory. */

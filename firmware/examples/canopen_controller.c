@@ -61,7 +61,7 @@ int main(void) {
       case 0: /* one frame, or none */
         if (board_can_receive(&frame)) flexcomp_can_receive(can, frame.id, frame.bytes, frame.size);
         break;
-      case 1: /* heartbeat, timeouts, an answer that found no room */
+      case 1: /* heartbeat, timeouts, an answer that could not be sent */
         flexcomp_can_poll(can, board_now_ms());
         break;
       default: /* the next piece of a slot that is being written */

@@ -51,7 +51,7 @@ int main() {
     return 1;
   if (model_from_image(tx60l_image, sizeof tx60l_image, robot, model) != flexcomp::Refusal::none) return 2;
 
-  // Every cycle: what the joints carry, and the command.
+  // Every cycle: the load, and the command.
   const flexcomp::Context<Scalar> context = flexcomp::default_context<Scalar>(robot);
   std::array<Scalar, 6> q_rad;
   for (std::size_t j = 0; j < 6; ++j) q_rad[j] = tx60l_command_rad[j];

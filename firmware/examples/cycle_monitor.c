@@ -36,7 +36,7 @@ typedef struct figures {
 } figures;
 
 /* Written by the cycle alone; the background copies it. */
-static figures kept;
+static figures recorded;
 
 /* One step that waits for its class. The background announces a change of set a moment after the cycle has taken
  * it, so steps are filed some cycles later. */
@@ -81,8 +81,8 @@ static void raise_to(flexcomp_real* largest, flexcomp_real v) {
 
 static void file(const sample* s) {
   const int c = class_of(s);
-  step_figures* steps = &kept.steps[c][s->loaded ? LOADED : IDLE];
-  correction_figures* corrections = &kept.corrections[c];
+  step_figures* steps = &recorded.steps[c][s->loaded ? LOADED : IDLE];
+  correction_figures* corrections = &recorded.corrections[c];
   if (steps->cycles == 0 || s->ticks < steps->least_ticks) steps->least_ticks = s->ticks;
   if (s->ticks > steps->most_ticks) steps->most_ticks = s->ticks;
   ++steps->cycles;
@@ -103,7 +103,7 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status sta
   sample* s = &waiting[number % DELAY];
   if (number > DELAY && s->cycle != 0) file(s);
   if (clear_wanted != 0) {
-    kept = nothing;
+    recorded = nothing;
     for (unsigned k = 0; k < DELAY; ++k) waiting[k].cycle = 0;
     clear_wanted = 0;
   }
@@ -116,23 +116,24 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status sta
   for (unsigned j = 0; j < FLEXCOMP_JOINTS; ++j) {
     const flexcomp_real correction = q_corrected_rad[j] - q_command_rad[j];
     if (q_command_rad[j] < last_command_rad[j] || q_command_rad[j] > last_command_rad[j]) s->standing = 0;
-    s->change_rad[j] = correction - kept.correction_rad[j];
+    s->change_rad[j] = correction - recorded.correction_rad[j];
     s->correction_rad[j] = correction;
-    kept.command_rad[j] = q_command_rad[j];
-    kept.correction_rad[j] = correction;
+    recorded.command_rad[j] = q_command_rad[j];
+    recorded.correction_rad[j] = correction;
     last_command_rad[j] = q_command_rad[j];
   }
   /* The first cycle has none before it. */
-  if (kept.cycles != 0) {
+  if (recorded.cycles != 0) {
     const uint32_t interval = start_ticks - last_start_ticks;
-    if (kept.cycles == 1 || interval < kept.least_interval_ticks) kept.least_interval_ticks = interval;
-    if (interval > kept.most_interval_ticks) kept.most_interval_ticks = interval;
+    if (recorded.cycles == 1 || interval < recorded.least_interval_ticks)
+      recorded.least_interval_ticks = interval;
+    if (interval > recorded.most_interval_ticks) recorded.most_interval_ticks = interval;
   } else {
     s->cycle = 0;
   }
   last_start_ticks = start_ticks;
-  ++kept.cycles;
-  if (late) ++kept.late;
+  ++recorded.cycles;
+  if (late) ++recorded.late;
   cycle_number = number;
 }
 
@@ -200,7 +201,7 @@ size_t monitor_report(char* to, size_t size) {
   do {
     number = cycle_number;
     __asm volatile("" ::: "memory");
-    f = kept;
+    f = recorded;
     __asm volatile("" ::: "memory");
   } while (number != cycle_number || clear_wanted != 0);
 

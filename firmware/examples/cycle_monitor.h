@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How long the control cycle's step takes and how evenly it comes, kept apart by what the controller is doing.
+/* How long the control cycle's step takes and how evenly it comes, separated by what the controller is doing.
  * It stands beside the flexcomp library and costs the cycle some hundred instructions after the step. */
 #ifndef FLEXCOMP_EXAMPLES_CYCLE_MONITOR_H
 #define FLEXCOMP_EXAMPLES_CYCLE_MONITOR_H

@@ -30,7 +30,7 @@ uint32_t board_now_ms(void);
  * interrupt, too: what it left to do waits for one cycle at most. BACKGROUND. */
 void board_sleep(void);
 
-/* Serial lines: the bus, and a console for people. BACKGROUND. */
+/* Serial lines: the bus, and a text console. BACKGROUND. */
 enum { BOARD_BUS = 0, BOARD_CONSOLE = 1 };
 /* Bytes that came in since the last call, at most `size`. */
 size_t board_receive(unsigned line, uint8_t* to, size_t size);

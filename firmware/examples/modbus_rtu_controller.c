@@ -28,8 +28,9 @@ static void plan_command(flexcomp_real q_rad[FLEXCOMP_JOINTS]) {
   const uint32_t half = PATH_CYCLES / 2;
   const uint32_t there = phase < half ? phase : PATH_CYCLES - phase;
   const flexcomp_real s = (flexcomp_real)there / (flexcomp_real)half;
-  const flexcomp_real way = s * s * s * (10 + s * (6 * s - 15));
-  for (unsigned j = 0; j < FLEXCOMP_JOINTS; ++j) q_rad[j] = from_rad[j] + (to_rad[j] - from_rad[j]) * way;
+  const flexcomp_real fraction = s * s * s * (10 + s * (6 * s - 15));
+  for (unsigned j = 0; j < FLEXCOMP_JOINTS; ++j)
+    q_rad[j] = from_rad[j] + (to_rad[j] - from_rad[j]) * fraction;
   if (!standing) phase = (phase + 1) % PATH_CYCLES;
 }
 

@@ -262,7 +262,7 @@ Neglected neglected(const arms::Arm& arm, double payload_kg) {
       const Vector6<double> exact = flexcomp::exact_column(model, at, term, context);
       const Vector6<double> off = flexcomp::column(model, at, term, context) - exact;
       if (!flexcomp::is_constant(term)) {
-        EXPECT_EQ(off.norm(), 0);  // compliance and gravity are read off the same pass either way
+        EXPECT_EQ(off.norm(), 0);  // compliance and gravity come from the same pass in both
       } else if (arms::turns(term.place)) {
         most.rotation = std::max(most.rotation, off.norm() / exact.norm());
       } else {

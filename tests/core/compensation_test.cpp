@@ -79,12 +79,12 @@ Figures regular_poses(const arms::Robot& robot, const arms::TermSet<double>& set
     f.before_m = std::max(f.before_m, flexcomp::target_residual(model, q, q, context).position_m);
     const Compensated<double, 6> out = flexcomp::compensate(model, q, context);
     if (out.status == StepStatus::at_limit) {
-      // Held exactly at the limit, which the corrected command would have passed.
+      // Exactly at the limit, which the corrected command would have passed.
       ++f.at_limit;
-      bool held = false;
+      bool limited = false;
       for (std::size_t i = 0; i < 6; ++i)
-        held = held || out.q[i] == model.lower(i) || out.q[i] == model.upper(i);
-      EXPECT_TRUE(held && within_limits(model, out.q));
+        limited = limited || out.q[i] == model.lower(i) || out.q[i] == model.upper(i);
+      EXPECT_TRUE(limited && within_limits(model, out.q));
     } else {
       EXPECT_EQ(out.status, StepStatus::ok);
       const auto left = flexcomp::target_residual(model, out.q, q, context);
@@ -452,7 +452,7 @@ TEST(Compensation, HoldsAJointExactlyAtItsLimit) {
   ASSERT_EQ(unlimited.prepare(free, arms::table1(arm).list()), flexcomp::Refusal::none);
   const auto context = flexcomp::default_context<double>(arm.robot);
   arms::Random random(56);
-  int held = 0;
+  int limited = 0;
   for (int n = 0; n < 10000; ++n) {
     Joints q = random.pose(arm.robot);
     const std::size_t joint = random.below(6);
@@ -465,10 +465,10 @@ TEST(Compensation, HoldsAJointExactlyAtItsLimit) {
       ASSERT_EQ(out.q[i], std::min(std::max(wanted.q[i], model.lower(i)), model.upper(i)));
     }
     ASSERT_EQ(out.status == StepStatus::at_limit, passes);
-    held += passes ? 1 : 0;
+    limited += passes ? 1 : 0;
   }
-  EXPECT_GT(held, 3000);
-  EXPECT_LT(held, 7000);
+  EXPECT_GT(limited, 3000);
+  EXPECT_LT(limited, 7000);
 }
 
 template <class S>

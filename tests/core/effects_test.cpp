@@ -367,7 +367,7 @@ TEST(Effects, ALeverShorterThanAMillimetreIsZero) {
 }
 
 TEST(Effects, PositiveCoefficientsSag) {
-  // Every arm held out sideways: the tool goes down with k > 0 and with compliance > 0, on the ceiling up.
+  // Every arm stretched out sideways: the tool goes down with k > 0 and with compliance > 0, on the ceiling up.
   for (const arms::Arm& arm : arms::all()) {
     for (const double gravity : {-9.81, 9.81}) {
       arms::Robot robot = arm.robot;

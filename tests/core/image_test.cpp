@@ -92,7 +92,7 @@ double any_finite(arms::Random& random) {
   }
 }
 
-/// Any list that the layout can carry, whether or not a model would take it.
+/// Any list that the layout can represent, valid for a model or not.
 TermSet<double> any_list(arms::Random& random) {
   TermSet<double> set;
   const std::size_t tables = random.below(5);
@@ -613,10 +613,10 @@ TEST(Numbers, FloatIsTheNearestOfAnyDouble) {
     expect_nearest(b);
     // In and beside the range of floats, with ties and near-ties in the 29 bits that fall off.
     const std::uint64_t exponent = 1023 - 130 + b % 262;
-    const std::uint64_t kept = (random.bits() & 0xFFFFFFE0000000ULL) & 0xFFFFFFFFFFFFFULL;
+    const std::uint64_t leading = (random.bits() & 0xFFFFFFE0000000ULL) & 0xFFFFFFFFFFFFFULL;
     const std::uint64_t off[] = {
         0, 0x10000000, 0x0FFFFFFF, 0x10000001, 0x1FFFFFFF, 1, random.bits() & 0x1FFFFFFF};
-    expect_nearest((b & 0x8000000000000000ULL) | (exponent << 52U) | kept | off[random.below(7)]);
+    expect_nearest((b & 0x8000000000000000ULL) | (exponent << 52U) | leading | off[random.below(7)]);
     if (::testing::Test::HasFatalFailure()) return;
   }
   for (const double d :
@@ -673,7 +673,7 @@ TEST(Numbers, Crc32) {
   EXPECT_EQ(of(""), 0U);
   EXPECT_EQ(of("a"), 0xE8B7BE43U);
   EXPECT_EQ(of("The quick brown fox jumps over the lazy dog"), 0x414FA339U);
-  // In pieces as in one, for every way to cut.
+  // In pieces as in one, for every position of the cut.
   const std::string s = "The quick brown fox jumps over the lazy dog";
   const auto* p = reinterpret_cast<const std::uint8_t*>(s.data());
   for (std::size_t cut = 0; cut <= s.size(); ++cut)

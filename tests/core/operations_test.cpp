@@ -118,7 +118,7 @@ TEST(Operations, OfACompensation) {
     counting::count() = {};
     const flexcomp::Compensated<Real, 6> r = flexcomp::compensate(model, command, counted);
     const counting::Count c = counting::count();
-    // The counting scalar must go the very way of double.
+    // The counting scalar must take the same branches as double.
     const flexcomp::Compensated<double, 6> d = flexcomp::compensate(reference, q, context);
     ASSERT_EQ(r.status, d.status);
     for (std::size_t i = 0; i < 6; ++i) ASSERT_EQ(r.q[i].v, d.q[i]);

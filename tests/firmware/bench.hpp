@@ -156,7 +156,7 @@ class Arm {
 
   StepResult step(const Joints& q = {}) { return device->step(q, default_context<Scalar>(robot)); }
 
-  /// Background and cycle, until what is under way has ended.
+  /// Background and cycle, until the work has ended.
   wire::Status settle() {
     for (int k = 0; k < 200; ++k) {
       device->store().poll(now_ms += 1);

@@ -82,7 +82,7 @@ class Canopen : public testing::Test {
     return code(ask(head(0x23U | ((4 - size) << 2U), index, sub, value)));
   }
 
-  /// Uploads whatever there is; empty on an abort, whose code is kept.
+  /// Uploads whatever there is; empty on an abort, whose code is stored.
   Bytes upload(std::uint16_t index, std::uint8_t sub) {
     auto r = ask(head(0x40, index, sub));
     last_code = code(r);

@@ -138,7 +138,7 @@ TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
   }
   EXPECT_GT(largest_correction, 1e-4);
   EXPECT_GT(largest_step, 0);
-  // The kept difference is at most twice the largest correction.
+  // The fading difference is at most twice the largest correction.
   EXPECT_LE(largest_step, 1.5 / fade * 2 * largest_correction * (1 + 1e-6));
 }
 
@@ -235,7 +235,7 @@ TEST(Step, FadesStayWithinTheLimits) {
   }
 }
 
-// A held correction must not take a joint over a limit that its command respects, and where the command comes
+// A constant correction must not move a joint over a limit that its command respects, and where the command comes
 // back the output moves no farther than the command does.
 TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
   DeviceSettings settings;
@@ -251,9 +251,9 @@ TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
   for (std::size_t j = 0; j < joints; ++j) end[j] = good[j] > q[j] ? real(2.2) : real(-2.2);
   FirmwareContext unknown = default_context<Scalar>(arm.robot);
   unknown.temperature_c = std::numeric_limits<Scalar>::quiet_NaN();
-  const StepResult held = arm.device->step(end, unknown);
-  EXPECT_EQ(held.status, StepStatus::refused);
-  EXPECT_EQ(held.q, end);
+  const StepResult limited = arm.device->step(end, unknown);
+  EXPECT_EQ(limited.status, StepStatus::refused);
+  EXPECT_EQ(limited.q, end);
   Joints broken = end;
   broken[5] = std::numeric_limits<Scalar>::quiet_NaN();
   const StepResult r = arm.step(broken);
@@ -300,7 +300,7 @@ TEST(Step, TracksTheDirectionThroughADeadBand) {
   EXPECT_EQ(go(0), 0);
   EXPECT_NEAR(go(0.00025), 0.5, 1e-6);
   EXPECT_EQ(go(0.1), 1);
-  EXPECT_NEAR(go(0.1 - 0.0005), 0, 1e-4);  // half the band: on the way
+  EXPECT_NEAR(go(0.1 - 0.0005), 0, 1e-4);  // half the band
   EXPECT_NEAR(go(0.1 - 0.0010), -1, 1e-4);
   EXPECT_EQ(go(-0.1), -1);
   for (int k = 0; k < 1000; ++k)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# A firmware engineer's two ways to the library, with the board of this target: the installed package with its toolchain
+# The two installations of the library for a firmware engineer, with the board of this target: the installed package with its toolchain
 # file, and a build without our CMake (docs/targets.md).
 set(boards "${PROJECT_SOURCE_DIR}/firmware/boards")
 get_target_property(board_sources flexcomp_board SOURCES)

@@ -9,7 +9,7 @@
   figures.py run    --build DIR --tools arm-none-eabi- -- EMULATOR… IMAGE: stack taken in a run against the worst
   figures.py stack  --ci A.ci [--ci B.ci] --entry NAME [--limit BYTES]: the worst stack below one function
 
-Stack is the longest way through the call graph that the compiler wrote (-fcallgraph-info=su), frame by frame. What the
+Stack is the longest path through the call graph that the compiler wrote (-fcallgraph-info=su), frame by frame. What the
 C library brings is read from the disassembly of the image. It refuses to give a figure where there is none: recursion,
 a frame whose size is known only at run time, an indirect call that is not in HOOKS below, a function without a frame.
 
@@ -127,18 +127,18 @@ class CallGraph:
         return out - END_OF_ALL
 
     def worst(self, name, above=()):
-        """Bytes below and in a function, and the way to them."""
+        """Bytes below and in a function, and the path to them."""
         if name in above:
             raise Refused("recursion: " + " -> ".join(above[above.index(name):] + (name,)))
         if name not in self.frame:
             raise Refused(f"{name}: nothing says how much stack it takes" + (f" (called by {above[-1]})" if above else ""))
-        deepest, way = 0, ()
+        deepest, path = 0, ()
         for to in sorted(self.callees(name)):
             if to not in self._known:
                 self._known[to] = self.worst(to, above + (name,))
             if self._known[to][0] > deepest:
-                deepest, way = self._known[to]
-        return self.frame[name] + deepest, (name,) + way
+                deepest, path = self._known[to]
+        return self.frame[name] + deepest, (name,) + path
 
     _known = {}
 
@@ -174,10 +174,10 @@ def measure(build, tools):
     own = sum(size for name, size in given.items() if name in ("memory", "can_memory", "rtu_memory", "unknown_robot"))
     # Sections are filled up to 8 bytes.
     figures["ram static"] = max(0, (sections(image("both_buses"), tools)[1] - nothing[1] - own) // 8 * 8)
-    graph, ways = call_graph(build, tools), {}
+    graph, paths = call_graph(build, tools), {}
     for entry in ENTRIES:
-        figures[f"stack {entry}"], ways[entry] = graph.worst(f"flexcomp_{entry}")
-    return figures, ways
+        figures[f"stack {entry}"], paths[entry] = graph.worst(f"flexcomp_{entry}")
+    return figures, paths
 
 
 def call_graph(build, tools):
@@ -193,7 +193,7 @@ def call_graph(build, tools):
 
 def in_a_run(args):
     """What an emulated run takes of the stack, against the worst that the call graph gives. Below it, or the graph is
-    wrong; and the step and the boot, whose ways are mostly straight, not far below it, or the graph is idle."""
+    wrong; and the step and the boot, whose paths are mostly straight, not far below it, or the graph is idle."""
     graph = call_graph(args.build, args.tools)
     out = subprocess.run(args.command, check=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT).stdout
     taken = {name: int(size, 16) for name, size in re.findall(r"^stack (\w+) 0x([0-9a-f]+)", out, re.M)}
@@ -270,11 +270,11 @@ def check(args):
 
 
 def update(args):
-    figures, ways = measure(args.build, args.tools)
+    figures, paths = measure(args.build, args.tools)
     if write(args, figures, "target_bytes"):
         return 1
-    for entry, way in ways.items():
-        print(f"flexcomp_{entry}: " + " > ".join(way))
+    for entry, path in paths.items():
+        print(f"flexcomp_{entry}: " + " > ".join(path))
     return 0
 
 
@@ -295,8 +295,8 @@ def stack(args):
     graph = CallGraph()
     for path in args.ci:
         graph.read(path)
-    size, way = graph.worst(args.entry)
-    print(f"{args.entry}: {size} bytes: " + " > ".join(f"{f} ({graph.frame[f]})" for f in way))
+    size, path = graph.worst(args.entry)
+    print(f"{args.entry}: {size} bytes: " + " > ".join(f"{f} ({graph.frame[f]})" for f in path))
     if args.limit and size > args.limit:
         print(f"more than the {args.limit} bytes allowed")
         return 1

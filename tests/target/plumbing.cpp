@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proves the way from reset to exit: memory is set up, constructors have run, the floating-point unit works.
+// Tests start-up from reset to exit: memory is set up, constructors have run, the floating-point unit works.
 #include <cstdint>
 
 #include "semihosting.hpp"

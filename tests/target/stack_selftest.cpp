@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much stack the calls really take, to be held against the worst that figures.py works out: a pattern is written
+// How much stack the calls really take, compared with the worst that figures.py works out: a pattern is written
 // below the stack pointer, a call is made, and what is left of the pattern is counted. Prints "stack NAME 0x…".
 #include <flexcomp.h>
 

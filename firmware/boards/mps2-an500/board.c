@@ -61,7 +61,7 @@ void flexcomp_board_interrupt(void) {
       if (in - ring_out[line] < RING) {
         ring[line][in % RING] = byte;
         ring_in[line] = in + 1;
-      } /* else the byte is lost, and the bus finds its way back by checksum and gap */
+      } /* else the byte is lost, and the bus resynchronises by checksum and gap */
     }
   }
 }

@@ -101,7 +101,7 @@ class ModbusTcp {
       : server_(&server), unit_(unit), transmit_(transmit) {}
 
   /// Bytes from the stream, in any portions. False where the stream is not Modbus (protocol identifier not 0,
-  /// or a length that no PDU has): the connection must be closed, there is no way to find the next frame.
+  /// or a length that no PDU has): the connection must be closed, the next frame cannot be found.
   bool receive(const std::uint8_t* bytes, std::size_t size);
 
  private:
