@@ -226,7 +226,7 @@ typedef enum flexcomp_status {
   FLEXCOMP_LIMITED = 2,       /**< the correction was scaled to the largest one allowed */
   FLEXCOMP_AT_LIMIT = 3,      /**< a corrected joint is at its limit */
   FLEXCOMP_NO_SET = 4,        /**< no parameter set: the command is passed through */
-  FLEXCOMP_REFUSED = 5        /**< not finite or beyond a limit: passed through, or with the last correction */
+  FLEXCOMP_REFUSED = 5        /**< not finite or beyond a limit; see flexcomp_on_refusal */
 } flexcomp_status;
 
 /** One control cycle (C1, C18 to C20): joint command (rad) in, corrected joint command (rad) out; they may be

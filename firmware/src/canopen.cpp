@@ -18,7 +18,7 @@ namespace {
 
 using co::Access;
 
-/// One entry of the object dictionary as it is served; size 0 where it varies.
+/// Entry of the object dictionary as it is served; size 0 where it varies.
 struct Entry {
   std::uint16_t index;
   std::uint8_t sub;
@@ -85,7 +85,7 @@ std::uint32_t CanopenNode::code_of(wire::Answer a) const {
 
 bool CanopenNode::staging() const { return index_ == co::image && sub_ == co::image_staging; }
 
-/// Ends the transfer; what it has brought into staging goes with it.
+/// Ends the transfer and discards what it has staged.
 void CanopenNode::forget() {
   if (transfer_ == Transfer::download && staging()) device_.store().disconnect(origin_);
   transfer_ = Transfer::none;
@@ -122,8 +122,8 @@ void CanopenNode::nmt(std::uint8_t command) {
       break;
     case co::NmtCommand::reset_node:
     case co::NmtCommand::reset_communication:
-      // Both reset the node's communication. The control cycle goes on: an arm must not lose its compensation
-      // because somebody restarts the network.
+      // Both reset the node's communication. The control cycle continues: a restart of the network must not
+      // end the compensation.
       reset();
       break;
   }
@@ -189,7 +189,7 @@ void CanopenNode::request(const std::uint8_t* frame) {
       forget();
       return;
     default:
-      // Block transfer and what does not exist. The client's multiplexor comes back in the abort.
+      // Block transfer and unknown specifiers. The abort repeats the client's multiplexor.
       forget();
       index_ = load_u16(frame + 1);
       sub_ = frame[3];
@@ -197,7 +197,7 @@ void CanopenNode::request(const std::uint8_t* frame) {
   }
 }
 
-/// Whether the object takes a download of this size.
+/// Abort code of a download of this size to the object, `none` where it is accepted.
 std::uint32_t CanopenNode::accept(std::uint32_t size, bool known) {
   std::uint32_t code = co::abort::none;
   const Entry* entry = find(index_, sub_, code);
@@ -213,7 +213,7 @@ std::uint32_t CanopenNode::accept(std::uint32_t size, bool known) {
   return co::abort::none;
 }
 
-/// The next bytes of a download.
+/// Stores the next bytes of a download.
 std::uint32_t CanopenNode::take(const std::uint8_t* bytes, std::uint32_t size) {
   if (size_known_ && size > size_ - done_) return co::abort::too_long;
   if (staging()) {
@@ -227,7 +227,7 @@ std::uint32_t CanopenNode::take(const std::uint8_t* bytes, std::uint32_t size) {
   return co::abort::none;
 }
 
-/// All bytes of a download have come.
+/// Ends a download: checks its size and writes the object.
 std::uint32_t CanopenNode::complete() {
   if (size_known_ && done_ != size_) return co::abort::too_short;
   if (staging()) {
@@ -242,7 +242,9 @@ std::uint32_t CanopenNode::complete() {
   return set(scratch_.data(), done_);
 }
 
-// 001 0 nn e s: nn bytes without data where e and s are set, e expedited, s size indicated.
+// Initiate download (CiA 301, 7.2.4.3). n: bytes without data, e: expedited, s: size indicated.
+//   request   byte 0: 001 0 nn e s   1-2: index   3: sub-index   4-7: data (e) or size (s)
+//   response  byte 0: 011 00000      1-2: index   3: sub-index   4-7: 0
 void CanopenNode::begin_download(const std::uint8_t* frame) {
   const bool expedited = (frame[0] & 2U) != 0;
   const bool sized = (frame[0] & 1U) != 0;
@@ -284,7 +286,9 @@ void CanopenNode::begin_download(const std::uint8_t* frame) {
   reply(answer);
 }
 
-// 000 t nnn c: t toggle, nnn bytes without data, c last segment.
+// Download segment. t: toggle, n: bytes without data, c: last segment.
+//   request   byte 0: 000 t nnn c    1-7: data
+//   response  byte 0: 001 t 0000     1-7: 0
 void CanopenNode::download_segment(const std::uint8_t* frame) {
   if (transfer_ != Transfer::download) {
     abort(co::abort::command);
@@ -307,7 +311,9 @@ void CanopenNode::download_segment(const std::uint8_t* frame) {
   reply(answer);
 }
 
-// 010 0 0000 -> 010 0 nn e s.
+// Initiate upload.
+//   request   byte 0: 010 00000      1-2: index   3: sub-index   4-7: 0
+//   response  byte 0: 010 0 nn e s   1-2: index   3: sub-index   4-7: data (e) or size (s)
 void CanopenNode::begin_upload(const std::uint8_t* frame) {
   index_ = load_u16(frame + 1);
   sub_ = frame[3];
@@ -336,7 +342,9 @@ void CanopenNode::begin_upload(const std::uint8_t* frame) {
   reply(answer);
 }
 
-// 011 t 0000 -> 000 t nnn c.
+// Upload segment.
+//   request   byte 0: 011 t 0000     1-7: 0
+//   response  byte 0: 000 t nnn c    1-7: data
 void CanopenNode::upload_segment(const std::uint8_t* frame) {
   if (transfer_ != Transfer::upload) {
     abort(co::abort::command);
@@ -349,7 +357,7 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
   std::uint8_t answer[8] = {};
   const std::uint32_t n = size_ - done_ < 7 ? size_ - done_ : 7;
   if (index_ == co::image) {
-    // A set that changed meanwhile would give a mixture of two.
+    // If the active set has changed since, the segments would mix two images.
     wire::Status status;
     device_.store().status(status);
     if (status.active_crc != image_crc_ || status.active_bytes != size_ ||
@@ -374,7 +382,7 @@ std::uint32_t CanopenNode::command(wire::Command command, std::uint32_t argument
   return code_of(device_.store().run(command, argument, origin_));
 }
 
-/// Carries out a download to the object at hand; the size has been checked.
+/// Writes the selected object; the size has been checked.
 std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
   switch (index_) {
     case co::store_parameters:
@@ -405,7 +413,7 @@ std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
   }
 }
 
-/// Puts the value of the object at hand into scratch_; of the active image only its size.
+/// Copies the value of the selected object to scratch_; of the active image only its size.
 std::uint32_t CanopenNode::get(std::uint32_t& size) {
   std::uint32_t code = co::abort::none;
   const Entry* entry = find(index_, sub_, code);

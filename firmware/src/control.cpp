@@ -70,8 +70,8 @@ void ControlCycle::track(const Joints& q) {
   }
 }
 
-// Joint limits of (C20): a fading or constant correction must not move a joint beyond a limit that the command
-// respects.
+// Joint limits of (C20): a fading or constant correction must not move a joint beyond a limit that the
+// command respects.
 Scalar ControlCycle::within_limits(std::size_t joint, Scalar q_command, Scalar q) const {
   const Scalar low = q_command < lower_[joint] ? q_command : lower_[joint];
   const Scalar high = q_command > upper_[joint] ? q_command : upper_[joint];

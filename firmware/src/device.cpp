@@ -11,7 +11,7 @@ namespace firmware {
 
 namespace {
 
-/// binary64 bits as they came over the wire to the scalar computed with.
+/// Scalar of binary64 bits from the wire.
 Scalar scalar(std::uint64_t bits) { return from_binary64<Scalar>(double_of(bits)); }
 
 float float_of(std::uint32_t bits) {
@@ -28,7 +28,7 @@ Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings&
       cycle_(robot, sets_, settings.control),
       store_(robot, sets_, storage, settings.store) {
   if (settings.name == nullptr) return;
-  // A name that is too long for the record is left out: half of it would be another name.
+  // A name that is too long for the record is left out: a part of it would be another name.
   while (name_size_ < name_.size() && settings.name[name_size_] != 0) {
     name_[name_size_] = settings.name[name_size_];
     ++name_size_;

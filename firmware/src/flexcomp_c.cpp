@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The C interface: every object is built in the caller's memory, nothing else happens here.
+// The C interface: builds every object in the caller's memory and forwards the calls.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -14,7 +14,7 @@ namespace fw = flexcomp::firmware;
 
 namespace {
 
-/// A device with the hooks of C behind it.
+/// A device and the C hooks that it calls.
 struct Arm {
   Arm(const fw::Robot& robot, const flexcomp_storage& c_storage, const fw::DeviceSettings& settings)
       : hooks(c_storage),
@@ -108,11 +108,11 @@ Can& can_of(flexcomp_can* can) { return *reinterpret_cast<Can*>(can); }
 Rtu& rtu_of(flexcomp_rtu* rtu) { return *reinterpret_cast<Rtu*>(rtu); }
 Tcp& tcp_of(flexcomp_tcp* tcp) { return *reinterpret_cast<Tcp*>(tcp); }
 
-/// The geometry is double on every target, and the M4F has no double arithmetic: it is looked at as bits, or
-/// as the target's scalar.
+/// The geometry is double on every target and the M4F has no double arithmetic: numbers are compared as bits
+/// or as the target's scalar.
 fw::Scalar scalar(double v) { return flexcomp::from_binary64<fw::Scalar>(v); }
 
-/// All that follows the name are doubles; they are looked at in one go.
+/// True where all members after the name, which are doubles, are finite.
 bool all_finite(const flexcomp_robot& robot) {
   constexpr std::size_t first = offsetof(flexcomp_robot, links);
   static_assert((sizeof robot - first) % sizeof(double) == 0, "only doubles");
@@ -221,7 +221,7 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]) {
   Arm& arm = arm_of(fc);
-  // An array of C and one of C++ are the same memory.
+  // A C array and a std::array have the same layout.
   static_assert(sizeof(fw::Joints) == sizeof(flexcomp_real[FLEXCOMP_JOINTS]), "nothing but the numbers");
   const fw::Joints& q = *reinterpret_cast<const fw::Joints*>(q_command_rad);
   fw::StepResult result;

@@ -64,7 +64,7 @@ const BlockPlace* block_at(std::uint32_t address) {
   return nullptr;
 }
 
-/// Whether all of a range lies in blocks that may be read (or written).
+/// True where all registers of a range exist and may be read (or written).
 bool range_exists(std::uint32_t address, std::uint32_t quantity, bool to_write) {
   if (address + quantity > 0x10000U) return false;
   while (quantity != 0) {
@@ -78,7 +78,7 @@ bool range_exists(std::uint32_t address, std::uint32_t quantity, bool to_write) 
   return true;
 }
 
-/// Changes some registers of a two-register number.
+/// Writes some registers of a two-register number.
 void patch32(std::uint32_t& value, std::uint32_t first, std::uint32_t quantity, const std::uint8_t* from) {
   std::uint8_t bytes[4];
   put32(bytes, value);
@@ -240,6 +240,8 @@ Exception ModbusServer::write(std::uint32_t address, std::uint32_t quantity, con
 }
 
 /// Read Device Identification (V1.1b3, 6.21): the three basic objects, as a stream or one by one.
+///   request   2B 0E code object
+///   response  2B 0E code 81 00 00 number (object length value) …
 std::size_t ModbusServer::identify(const std::uint8_t* request, std::size_t size, std::uint8_t* out) const {
   if (size < 2 || request[1] != read_device_identification) {
     return refuse(encapsulated_interface, Exception::illegal_function, out);
@@ -280,6 +282,7 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
   switch (function) {
     case read_holding_registers:
     case read_input_registers: {
+      // 6.3, 6.4: 03|04, address (2), quantity (2) -> 03|04, byte count, registers
       if (size != 5) return refuse(function, Exception::illegal_data_value, out);
       const std::uint32_t address = be16(request + 1);
       const std::uint32_t quantity = be16(request + 3);
@@ -295,6 +298,7 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
       return e == Exception::none ? 2 + 2 * static_cast<std::size_t>(quantity) : refuse(function, e, out);
     }
     case write_single_register: {
+      // 6.6: 06, address (2), value (2) -> the same
       if (size != 5) return refuse(function, Exception::illegal_data_value, out);
       const std::uint32_t address = be16(request + 1);
       if (!range_exists(address, 1, true)) return refuse(function, Exception::illegal_data_address, out);
@@ -304,8 +308,8 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
       return 5;
     }
     case diagnostics: {
-      // Sub-function 00, Return Query Data; the others are counters of a serial line that this server does
-      // not keep.
+      // 6.8: 08, sub-function 00 (Return Query Data), data -> the same. The other sub-functions are counters
+      // of a serial line, which this server does not have.
       if (size < 3) return refuse(function, Exception::illegal_data_value, out);
       if (be16(request + 1) != 0) return refuse(function, Exception::illegal_function, out);
       if (size > map::pdu_bytes) return refuse(function, Exception::illegal_data_value, out);
@@ -313,6 +317,7 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
       return size;
     }
     case write_multiple_registers: {
+      // 6.12: 10, address (2), quantity (2), byte count, registers -> 10, address, quantity
       if (size < 6) return refuse(function, Exception::illegal_data_value, out);
       const std::uint32_t address = be16(request + 1);
       const std::uint32_t quantity = be16(request + 3);
@@ -331,6 +336,8 @@ std::size_t ModbusServer::answer(const std::uint8_t* request, std::size_t size, 
       return 5;
     }
     case read_write_registers: {
+      // 6.17: 17, read address (2), quantity (2), write address (2), quantity (2), byte count, registers
+      //       -> 17, byte count, registers
       if (size < 10) return refuse(function, Exception::illegal_data_value, out);
       const std::uint32_t from = be16(request + 1);
       const std::uint32_t reads = be16(request + 3);
@@ -384,7 +391,7 @@ std::uint16_t modbus_crc(const std::uint8_t* bytes, std::size_t size, std::uint1
   return crc;
 }
 
-/// Bytes of the request that has begun, 0 where they cannot be told (yet).
+/// Length of the request frame whose first bytes are in frame_, 0 where it is not known (yet).
 std::size_t ModbusRtu::expected() const {
   if (size_ < 2) return 0;
   switch (frame_[1]) {
@@ -415,7 +422,7 @@ std::size_t ModbusRtu::expected() const {
   }
 }
 
-/// A frame whose CRC is right lies in frame_.
+/// Answers the frame in frame_, whose CRC is right.
 void ModbusRtu::take_frame() {
   const std::uint8_t unit = frame_[0];
   const std::size_t size = size_;
@@ -461,7 +468,7 @@ void ModbusRtu::receive(const std::uint8_t* bytes, std::size_t size, std::uint32
         take_frame();
       }
     } else if (size_ >= 4 && crc_ == 0) {
-      take_frame();  // somebody else's, request or answer
+      take_frame();  // request or answer of another unit
     }
   }
 }
@@ -472,6 +479,8 @@ void ModbusRtu::poll(std::uint32_t now_us) {
 
 // --- TCP ----------------------------------------------------------------------------------------------
 
+// MBAP header (V1.0b, 3.1.3): transaction (2), protocol 0 (2), length of unit and PDU (2), unit; then the
+// PDU.
 bool ModbusTcp::receive(const std::uint8_t* bytes, std::size_t size) {
   constexpr std::size_t header = 7;
   for (std::size_t i = 0; i < size && !broken_; ++i) {

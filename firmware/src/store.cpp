@@ -18,14 +18,14 @@ namespace {
 constexpr std::uint32_t seal_bytes = 32;
 constexpr std::uint32_t seal_offset = slot_bytes - seal_bytes;
 constexpr std::uint32_t unit_bytes = 32;    ///< non-volatile memory is written in multiples of this
-constexpr std::uint32_t chunk_bytes = 256;  ///< at most, per call
+constexpr std::uint32_t chunk_bytes = 256;  ///< most bytes per call
 constexpr std::uint8_t seal_magic[4] = {'F', 'L', 'X', 'S'};
 constexpr std::uint32_t shortest_image = image::header_bytes + image::crc_bytes;
 
 std::uint32_t rounded_up(std::uint32_t size) { return (size + unit_bytes - 1U) / unit_bytes * unit_bytes; }
 
 /// Joint readings spread evenly over the limits: multiples of g^-1 … g^-6 with
-/// g^7 = g + 1 (Roberts' sequence), in 32-bit integers, so that every target takes the same poses.
+/// g^7 = g + 1 (Roberts' sequence), in 32-bit integers, so that the poses are the same on every target.
 Scalar spread(std::uint32_t pose, std::size_t joint) {
   constexpr std::uint32_t step[joints] = {0xE60E2B73U, 0xCEBD76D9U, 0xB9C9AA3BU,
                                           0xA6F5777FU, 0x9609C71FU, 0x86D516E5U};
@@ -128,8 +128,7 @@ void Store::boot() {
     if (!sealed[slot]) continue;
     Set& set = found[slot];
     if (active_.index != Handover::none) {
-      // The other slot is only asked whether a rollback could use it; its model is prepared when it is
-      // needed.
+      // The other slot is checked for a later rollback, which prepares its model again.
       set.index = 1;
       if (load(set)) previous_ = set;
       continue;
@@ -152,7 +151,7 @@ void Store::boot() {
 
 // --- checks -------------------------------------------------------------------------------------------
 
-/// A model that the cycle neither uses nor may come to use.
+/// Index of a model that the cycle neither uses nor may use next.
 bool Store::free_model(std::uint32_t& index) const {
   if (!sets_.handover.settled()) return false;
   const std::uint32_t used = sets_.handover.in_use();
@@ -176,7 +175,8 @@ Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& he
   return plausible(model, detail) ? Refusal::none : Refusal::implausible;
 }
 
-/// Where the tool would go at 32 poses spread over the joint limits, against the nominal robot.
+/// True where the set moves the tool by no more than the plausible change, at 32 poses spread over the joint
+/// limits.
 bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
   FirmwareContext context = default_context<Scalar>(robot_);
   for (std::uint32_t pose = 1; pose <= 32; ++pose) {
@@ -214,7 +214,7 @@ Answer Store::begin(std::uint32_t length, Origin origin) {
   owner_ = origin;
   announced_ = length;
   touched_ = true;
-  // Memory is written in whole units: what pads the last one must not be what an earlier image left.
+  // Memory is written in whole units: the padding of the last one must not be bytes of an earlier image.
   std::memset(staging_.data(), 0xFF, staging_.size());
   return answer(Answer::accepted);
 }
@@ -480,7 +480,7 @@ void Store::work() {
       break;
     case Job::clear_stale:
       // A set that was refused at the start (limits of this firmware, a reading error) may carry a higher
-      // sequence: it must not come back at a later start in place of the one that is taken in now.
+      // sequence: a later start must not load it in place of this one.
       r = storage_.erase(storage_.user, incoming_.slot == 0 ? 1U : 0U);
       if (r == StorageResult::done) job_ = Job::seal;
       if (r == StorageResult::failed && job_trial_) {
@@ -501,7 +501,7 @@ void Store::work() {
         if (!read_seal(incoming_.slot, written) || written.crc != incoming_.crc) r = StorageResult::failed;
       }
       if (r == StorageResult::failed) {
-        // Not written down for certain: what runs must be what the next start would bring.
+        // The seal may be incomplete: the active set must be the one that the next start would load.
         if (job_trial_) {
           make_active(previous_);
           previous_ = Set{};
@@ -521,7 +521,7 @@ void Store::work() {
     }
     case Job::drop_incoming:
       r = storage_.erase(storage_.user, incoming_.slot);
-      if (r == StorageResult::done) r = StorageResult::failed;  // the commit has failed all the same
+      if (r == StorageResult::done) r = StorageResult::failed;  // the commit has failed in any case
       break;
     case Job::drop_active:
       r = active_.slot == wire::no_slot ? StorageResult::done : storage_.erase(storage_.user, active_.slot);
