@@ -191,16 +191,19 @@ TEST(JointDeflection, ConstantTwistMatchesTheChain) {
   }
 }
 
+/// True where the smallest singular value of a Jacobian is at least 0.1.
+bool is_regular(const arms::NominalJacobian::Matrix& j) {
+  using Solver = Eigen::SelfAdjointEigenSolver<arms::NominalJacobian::Matrix>;
+  return Solver(j * j.transpose(), Eigen::EigenvaluesOnly).eigenvalues()[0] >= 0.01;
+}
+
 /// Largest remaining position error over regular poses, m.
 double left_by(const arms::Robot& robot, const Model<double>& model, arms::Random& random, bool with_force) {
   const arms::NominalJacobian jacobian(robot);
   double left = 0;
   for (int n = 0; n < 4000 / part;) {
     const Joints q = random.pose(robot);
-    const Eigen::Matrix<double, 6, 6> j = jacobian(q);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(j * j.transpose(),
-                                                                            Eigen::EigenvaluesOnly);
-    if (!(solver.eigenvalues()[0] >= 0.01)) continue;
+    if (!is_regular(jacobian(q))) continue;
     ++n;
     flexcomp::Context<double, 6> context = flexcomp::default_context<double>(robot);
     for (double& d : context.direction) d = static_cast<double>(random.below(3)) - 1;
@@ -257,10 +260,7 @@ TEST(JointDeflection, GeneralPathMatchesTheJointOnlyPath) {
     double worst = 0;
     for (int n = 0; n < 4000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
-      const Eigen::Matrix<double, 6, 6> j = jacobian(q);
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(j * j.transpose(),
-                                                                              Eigen::EigenvaluesOnly);
-      if (!(solver.eigenvalues()[0] >= 0.01)) continue;
+      if (!is_regular(jacobian(q))) continue;
       const auto a = flexcomp::compensate(joints_only, q, context);
       const auto b = flexcomp::compensate(any, q, context);
       ASSERT_EQ(a.status, b.status);
