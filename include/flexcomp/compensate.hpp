@@ -126,9 +126,8 @@ inline Compensated<S, N> compensate(const Model<S, N, Cap>& model, const std::ar
 /// Remaining error of a pose: target minus what the forward model gives.
 template <class S>
 struct TargetResidual {
-  S position_m = S(0);                 ///< 3-D distance
-  S orientation_rad = S(0);            ///< sine of the angle, which is the angle to third order
-  bool is_beyond_right_angle = false;  ///< of the angle: its sine decreases again
+  S position_m = S(0);       ///< 3-D distance
+  S orientation_rad = S(0);  ///< sine of the angle, which is the angle to third order
 };
 
 /// Remaining error at the command q (rad): forward model (M15) against the nominal pose at q_command (rad).
@@ -142,11 +141,8 @@ inline TargetResidual<S> target_residual(const Model<S, N, Cap>& model, const st
   const Vector3<S> p = target.position - pose.position;
   Vec3<S> r;
   detail::rotation_error(columns_of(target.rotation), columns_of(pose.rotation), r);
-  const S trace = dot<S>(target.rotation.col(0), pose.rotation.col(0)) +
-                  dot<S>(target.rotation.col(1), pose.rotation.col(1)) +
-                  dot<S>(target.rotation.col(2), pose.rotation.col(2));
   using std::sqrt;
-  return {sqrt(dot<S>(p, p)), sqrt(dot(r, r)), !(trace > S(1))};
+  return {sqrt(dot<S>(p, p)), sqrt(dot(r, r))};
 }
 
 }  // namespace flexcomp
