@@ -23,6 +23,7 @@
 #include "model/effects.hpp"
 #include "report/page.hpp"
 #include "report/parameters.hpp"
+#include "report/pose_errors.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -109,20 +110,14 @@ PagePoses Report::poses_of(const std::string& text) const {
   }
   // Whatever of the context stands beside the joints, under the names of data files.
   static constexpr std::array<std::array<const char*, 2>, 3> recorded{
-      {{"payload_kg", "payload [kg]"},
-       {"temp_c", "temperature [°C]"},
-       {"time_s", "time since the first row [s]"}}};
+      {{"payload_kg", "payload [kg]"}, {"temp_c", "temperature [°C]"}, {"time_s", ""}}};
   for (const auto& [column, shown] : recorded) {
     const auto at = before.find(column);
     if (!at) continue;
-    PageCovariate c{shown, {}};
-    for (const CsvRow& row : before.rows) c.values.push_back(before.number(row, *at, unit::si));
-    if (column == std::string_view("time_s") && !c.values.empty()) {
-      // A clock counts from 1970 or from its own start: neither says anything.
-      const double start = c.values.front();
-      for (double& v : c.values) v -= start;
-    }
-    set.covariates.push_back(std::move(c));
+    std::vector<double> values;
+    for (const CsvRow& row : before.rows) values.push_back(before.number(row, *at, unit::si));
+    set.covariates.push_back(column == std::string_view("time_s") ? time_covariate(std::move(values))
+                                                                  : PageCovariate{shown, std::move(values)});
   }
   return set;
 }

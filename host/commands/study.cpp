@@ -41,7 +41,8 @@ struct Table {
   std::vector<std::vector<std::string>> rows;
 };
 
-Table table_of(const Study& study) {
+/// \param remark  heading of the last column, if there are remarks
+Table table_of(const Study& study, const std::string& remark) {
   Table table;
   table.columns = study.label_names;
   const auto has = [&](auto member) {
@@ -53,14 +54,16 @@ Table table_of(const Study& study) {
   table.columns.insert(table.columns.end(), {"paper", "ours"});
   if (uncertain) table.columns.emplace_back("±");
   if (limited) table.columns.emplace_back("Cramér-Rao limit");
-  table.columns.emplace_back("");
+  const bool remarked = std::any_of(study.rows.begin(), study.rows.end(),
+                                    [](const StudyRow& row) { return !row.remark.empty(); });
+  if (remarked) table.columns.push_back(remark);
   for (const StudyRow& row : study.rows) {
     std::vector<std::string> cells = row.labels;
     cells.push_back(figure_text(row.paper));
     cells.push_back(figure_text(row.ours));
     if (uncertain) cells.push_back(row.uncertainty ? fmt::format("{:.2g}", *row.uncertainty) : "–");
     if (limited) cells.push_back(figure_text(row.limit));
-    cells.push_back(row.remark);
+    if (remarked) cells.push_back(row.remark);
     table.rows.push_back(cells);
   }
   return table;
@@ -116,13 +119,7 @@ Page page_of(const Study& study) {
   page.title = study.title;
   page.summary =
       "The paper's figures, ours, and what no unbiased estimator can better: " + study.quantity + ".";
-  Table table = table_of(study);
-  table.columns.back() = "remark";
-  if (std::all_of(study.rows.begin(), study.rows.end(),
-                  [](const StudyRow& row) { return row.remark.empty(); })) {
-    table.columns.pop_back();
-    for (auto& row : table.rows) row.pop_back();
-  }
+  const Table table = table_of(study, "remark");
   PageSection section;
   section.title = "Result";
   section.columns = table.columns;
@@ -155,7 +152,7 @@ void StudyCommand::run() const {
       std::find_if(all.begin(), all.end(), [&](const StudyEntry& e) { return name == e.name; });
   const Study study = entry->run(options);
   if (watched) fmt::print(stderr, "\r\033[K");
-  common.say(fmt::format("{}\n  {}\n\n{}", study.title, study.quantity, text_of(table_of(study))));
+  common.say(fmt::format("{}\n  {}\n\n{}", study.title, study.quantity, text_of(table_of(study, ""))));
   for (const std::string& note : study.notes) common.say("  " + note);
   common.write_json(json_of(study, options));
   if (!report.empty()) {

@@ -6,8 +6,10 @@
 
 #include "diagnosis/effect_profile.hpp"
 #include "diagnosis/messages.hpp"
+#include "report/numbers.hpp"
 #include "report/parameters.hpp"
 #include "report/plots.hpp"
+#include "report/pose_errors.hpp"
 #include "report/results.hpp"
 #include "units.hpp"
 
@@ -17,7 +19,6 @@ namespace {
 constexpr double arcsec = pi / (180.0 * 3600.0);
 constexpr std::size_t shown_places = 10;
 
-std::string mm(double metres) { return fmt::format("{:.4f}", metres * 1e3); }
 std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
 
 /// From the model at the start to the last one, and the same on rows that nobody fitted.
@@ -28,8 +29,9 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
       "Position error (rms) {} mm before and {} mm after on the fitted rows; noise alone would give {} mm. "
       "The gap, "
       "noise taken away: {} mm before, {} mm after.",
-      mm(d.error_before.rms_m), mm(d.error_after.rms_m), mm(d.noise_floor_m),
-      mm(gap_of(d.error_before.rms_m, d.noise_floor_m)), mm(gap_of(d.error_after.rms_m, d.noise_floor_m)))};
+      mm_text(d.error_before.rms_m), mm_text(d.error_after.rms_m), mm_text(d.noise_floor_m),
+      mm_text(gap_of(d.error_before.rms_m, d.noise_floor_m)),
+      mm_text(gap_of(d.error_after.rms_m, d.noise_floor_m)))};
   Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]", {}, false, {}};
   if (d.noise_floor_m > 0) curves.floor = d.noise_floor_m * 1e3;
   if (!d.steps.empty())
@@ -38,7 +40,7 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
   for (std::size_t k = 0; k < d.steps.size(); ++k) {
     const DiagnosisStep& s = d.steps[k];
     fitted.points.push_back({static_cast<double>(k), s.train_rms_m * 1e3});
-    section.rows.push_back({fmt::format("{}", k), s.what, mm(s.train_rms_m),
+    section.rows.push_back({fmt::format("{}", k), s.what, mm_text(s.train_rms_m),
                             fmt::format("{:.3g}", s.chi2_per_dof), fmt::format("{:.3g}", s.cross_validated)});
   }
   if (fitted.points.empty())
@@ -56,9 +58,9 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
   if (others) {
     section.paragraphs.push_back(fmt::format(
         "On {} rows that were not fitted: {} mm before, {} mm after; the gap {} mm before, {} mm after.",
-        others->rows, mm(others->before.rms_m), mm(others->after.rms_m),
-        mm(gap_of(others->before.rms_m, others->noise_floor_m)),
-        mm(gap_of(others->after.rms_m, others->noise_floor_m))));
+        others->rows, mm_text(others->before.rms_m), mm_text(others->after.rms_m),
+        mm_text(gap_of(others->before.rms_m, others->noise_floor_m)),
+        mm_text(gap_of(others->after.rms_m, others->noise_floor_m))));
   }
   // One dot has no course.
   if (last > 0)
@@ -105,14 +107,6 @@ PageSection place(const Diagnosis& d) {
   return section;
 }
 
-/// Twice what nine of ten numbers stay below.
-double bulk(std::vector<double> sizes) {
-  if (sizes.empty()) return 0;
-  const std::size_t most = (sizes.size() - 1) * 9 / 10;
-  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(most), sizes.end());
-  return 2 * sizes[most];
-}
-
 /// The effect with its band, and the rows that speak of it.
 std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile& profile,
                                                             const std::string& title) {
@@ -140,7 +134,7 @@ std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile&
     without_sizes.push_back(std::abs(r.without_rad));
     left_sizes.push_back(std::abs(r.left_rad));
   }
-  const double far_without = bulk(without_sizes), far_left = bulk(left_sizes);
+  const double far_without = 2 * ninth_decile(without_sizes), far_left = 2 * ninth_decile(left_sizes);
   for (const ProfileRow& r : profile.rows) {
     if (r.sigma_rad > enough) continue;
     without.points.push_back({r.x, std::clamp(r.without_rad, -far_without, far_without) / arcsec});
@@ -186,7 +180,7 @@ PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::v
   section.columns = {"effect",    "largest [mm]",      "rms [mm]",           "p",
                      "delta BIC", "to the controller", "cannot be told from"};
   for (const FoundEffect& e : d.effects) {
-    section.rows.push_back({name(e.id), mm(e.largest_m), mm(e.rms_m), chance(e.p_value),
+    section.rows.push_back({name(e.id), mm_text(e.largest_m), mm_text(e.rms_m), chance(e.p_value),
                             fmt::format("{:.1f}", e.delta_bic), e.pushed ? "yes" : "no", rivals_text(e)});
     std::string text = name(e.id) + ": " + in_words(e.id) + ".";
     for (const std::string& line : sizes(e)) text += " " + line + ".";
@@ -255,13 +249,13 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
       {"poses", fmt::format("{}", rows.size())},
       {"chi-square per degree of freedom",
        fmt::format("{:.3g} → {:.3g}", d.chi2_per_dof_before, d.chi2_per_dof_after)},
-      {"gap, fitted rows [mm]", fmt::format("{} → {}", mm(gap_of(d.error_before.rms_m, d.noise_floor_m)),
-                                            mm(gap_of(d.error_after.rms_m, d.noise_floor_m)))},
+      {"gap, fitted rows [mm]", fmt::format("{} → {}", mm_text(gap_of(d.error_before.rms_m, d.noise_floor_m)),
+                                            mm_text(gap_of(d.error_after.rms_m, d.noise_floor_m)))},
       {"rows outside the bulk", fmt::format("{}", d.outliers.size())}};
   if (others) {
     p.facts.push_back({"gap, held-out rows [mm]",
-                       fmt::format("{} → {}", mm(gap_of(others->before.rms_m, others->noise_floor_m)),
-                                   mm(gap_of(others->after.rms_m, others->noise_floor_m)))});
+                       fmt::format("{} → {}", mm_text(gap_of(others->before.rms_m, others->noise_floor_m)),
+                                   mm_text(gap_of(others->after.rms_m, others->noise_floor_m)))});
   }
   p.sections.push_back(shrinking(d, others));
   p.sections.push_back(place(d));

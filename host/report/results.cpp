@@ -4,53 +4,58 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <functional>
 #include <utility>
 
 #include "report/models.hpp"
+#include "report/numbers.hpp"
 #include "report/parameters.hpp"
 #include "report/plots.hpp"
+#include "report/pose_errors.hpp"
+#include "report/shown_poses.hpp"
 
 namespace flexcomp::host {
 namespace {
 
-/// Appends what `of` gives for every row, where it is not the same for all.
-void add_covariate(PagePoses& set, const std::string& name, const std::vector<Observation>& rows,
-                   const std::function<double(const Observation&)>& of) {
-  PageCovariate c{name, {}};
-  for (const Observation& row : rows) c.values.push_back(of(row));
+using Row = const Observation&;
+
+std::vector<double> values_of(const std::vector<Observation>& rows, const std::function<double(Row)>& of) {
+  std::vector<double> values;
+  for (const Observation& row : rows) values.push_back(of(row));
+  return values;
+}
+
+/// Appends it where it is not the same at every row.
+void add_covariate(PagePoses& set, PageCovariate c) {
   const auto [low, high] = std::minmax_element(c.values.begin(), c.values.end());
   if (c.values.empty() || !(*high > *low)) return;
   set.covariates.push_back(std::move(c));
 }
 
 void add_covariates(PagePoses& set, const std::vector<Observation>& rows) {
-  using Row = const Observation&;
-  add_covariate(set, "payload [kg]", rows, [](Row r) { return r.context.payload_kg; });
-  add_covariate(set, "temperature [°C]", rows, [](Row r) { return r.context.temperature_c; });
-  // A clock counts from 1970 or from its own start: neither says anything.
-  const double start = rows.empty() ? 0 : rows.front().context.time_s;
-  add_covariate(set, "time since the first row [s]", rows,
-                [start](Row r) { return r.context.time_s - start; });
-  static constexpr std::array<const char*, 3> forces{"force x [N]", "force y [N]", "force z [N]"};
+  const auto add = [&](const std::string& name, const std::function<double(Row)>& of, bool on_paper = true) {
+    add_covariate(set, {name, values_of(rows, of), on_paper});
+  };
+  add("payload [kg]", [](Row r) { return r.context.payload_kg; });
+  add("temperature [°C]", [](Row r) { return r.context.temperature_c; });
+  add_covariate(set, time_covariate(values_of(rows, [](Row r) { return r.context.time_s; })));
   for (std::size_t k = 0; k < 3; ++k)
-    add_covariate(set, forces[k], rows, [k](Row r) { return r.context.force_n[k]; });
-  const std::size_t on_paper = set.covariates.size();
+    add(fmt::format("force {} [N]", "xyz"[k]), [k](Row r) { return r.context.force_n[k]; });
   const bool speeds = std::any_of(rows.begin(), rows.end(), [](Row r) {
     return std::any_of(r.context.relative_speed.begin(), r.context.relative_speed.end(),
                        [](double v) { return v != 0; });
   });
   for (std::size_t j = 0; j < joint_count; ++j) {
     if (speeds) {
-      add_covariate(set, fmt::format("last motion of joint {} (1: the fastest)", j + 1), rows,
-                    [j](Row r) { return r.context.relative_speed[j]; });
+      add(
+          fmt::format("last motion of joint {} (1: the fastest)", j + 1),
+          [j](Row r) { return r.context.relative_speed[j]; }, false);
     } else {
-      add_covariate(set, fmt::format("last direction of joint {}", j + 1), rows,
-                    [j](Row r) { return r.context.direction[j]; });
+      add(
+          fmt::format("last direction of joint {}", j + 1), [j](Row r) { return r.context.direction[j]; },
+          false);
     }
   }
-  for (std::size_t k = on_paper; k < set.covariates.size(); ++k) set.covariates[k].on_paper = false;
 }
 
 }  // namespace
@@ -104,18 +109,14 @@ void add_other_before(Page& page, const Before& before, bool frames_fitted) {
 }
 
 /// To the micrometre, and never a nought for what is none.
-std::string mm_text(double metres) {
+std::string micrometre_text(double metres) {
   return metres > 0 && metres < 5e-7 ? std::string("< 0.001") : fmt::format("{:.3f}", metres * 1e3);
 }
 
 std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) {
-  return fmt::format("Mean position error {} mm before, {} mm after.", mm_text(before.mean_m),
-                     mm_text(after.mean_m));
+  return fmt::format("Mean position error {} mm before, {} mm after.", micrometre_text(before.mean_m),
+                     micrometre_text(after.mean_m));
 }
-
-}  // namespace
-
-namespace {
 
 PageSection models_section(const std::vector<ModelFit>& compared, bool without_priors) {
   PageSection section;
@@ -128,7 +129,6 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
   section.columns = {
       "model",        "parameters",        "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
       "largest [mm]", "chi-square per dof"};
-  const auto mm = [](double metres) { return fmt::format("{:.4f}", metres * 1e3); };
   Curves curves{
       "Position error of the left-out rows over the share of rows that are further off, for each model",
       "% of the rows that are further off",
@@ -138,20 +138,18 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
       {}};
   bool partly = false;
   for (const ModelFit& m : compared) {
-    section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm(m.fitted.mean_m),
-                            mm(m.fitted.max_m), m.left_out ? mm(m.left_out->mean_m) : "–",
-                            m.left_out ? mm(m.left_out->max_m) : "–", fmt::format("{:.3g}", m.chi2_per_dof)});
+    section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm_text(m.fitted.mean_m),
+                            mm_text(m.fitted.max_m), m.left_out ? mm_text(m.left_out->mean_m) : "–",
+                            m.left_out ? mm_text(m.left_out->max_m) : "–",
+                            fmt::format("{:.3g}", m.chi2_per_dof)});
     partly = partly || !m.left_out;
     if (!m.left_out) continue;
     Curve curve{model_words(m.kind), {}, CurveStyle::line};
     std::vector<double> sorted = m.left_out_m;
     std::sort(sorted.begin(), sorted.end(), std::greater<>());
-    constexpr std::size_t most = 200;
-    const std::size_t n = sorted.size(), drawn = std::min(n, most);
-    for (std::size_t k = 0; k < drawn; ++k) {
-      const std::size_t at = drawn < 2 ? k : k * (n - 1) / (drawn - 1);
-      curve.points.push_back({100 * static_cast<double>(at) / static_cast<double>(n), sorted[at] * 1e3});
-    }
+    const auto n = static_cast<double>(sorted.size());
+    for (const std::size_t k : evenly_spaced(sorted.size(), 200))
+      curve.points.push_back({100 * static_cast<double>(k) / n, sorted[k] * 1e3});
     curves.curves.push_back(curve);
   }
   if (partly)
@@ -173,7 +171,7 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   p.facts = {{"data", data},
              {"poses", fmt::format("{}", rows.size())},
              {"parameters identifiable", fmt::format("{} of {}", r.identifiable, r.parameters)},
-             {"numbers of the frames", fmt::format("{}", r.frame_parameters)},
+             {"frame parameters", fmt::format("{}", r.frame_parameters)},
              {"chi-square per degree of freedom",
               r.fit.degrees_of_freedom > 0 ? fmt::format("{:.3g}", r.fit.chi2_per_dof()) : "–"},
              {"condition", fmt::format("{:.3g}", r.condition)},

@@ -2,8 +2,9 @@
 #include "report/shown_poses.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
+
+#include "report/pose_errors.hpp"
 
 namespace flexcomp::host {
 
@@ -29,10 +30,17 @@ std::vector<std::size_t> shown_rows(const std::vector<const std::vector<double>*
 std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::size_t limit) {
   std::vector<double> after, before;
   for (const PagePose& p : poses) {
-    after.push_back(std::hypot(p.after_m[0], p.after_m[1], p.after_m[2]));
-    before.push_back(std::hypot(p.before_m[0], p.before_m[1], p.before_m[2]));
+    after.push_back(length(p.after_m));
+    before.push_back(length(p.before_m));
   }
   return shown_rows({&after, &before}, limit);
+}
+
+std::vector<std::size_t> evenly_spaced(std::size_t count, std::size_t most) {
+  std::vector<std::size_t> chosen;
+  const std::size_t drawn = std::min(count, most);
+  for (std::size_t k = 0; k < drawn; ++k) chosen.push_back(drawn < 2 ? k : k * (count - 1) / (drawn - 1));
+  return chosen;
 }
 
 }  // namespace flexcomp::host

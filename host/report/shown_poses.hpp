@@ -19,6 +19,9 @@ std::vector<std::size_t> shown_poses(const std::vector<PagePose>& poses, std::si
 /// \param sizes  as many numbers each
 std::vector<std::size_t> shown_rows(const std::vector<const std::vector<double>*>& sizes, std::size_t limit);
 
+/// Which of `count` things in a row are drawn: all, or `most` evenly spaced ones.
+std::vector<std::size_t> evenly_spaced(std::size_t count, std::size_t most);
+
 }  // namespace flexcomp::host
 
 #endif

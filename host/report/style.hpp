@@ -40,7 +40,7 @@ th:first-child { text-align: left; font-weight: 400; } thead th { color: var(--s
   white-space: normal; vertical-align: bottom; }
 tbody tr { border-top: 1px solid var(--grid); } tr.pale { color: var(--soft); }
 .text { text-align: left; } td.text { white-space: normal; } td.long { min-width: 15rem; }
-.parameters { font-size: .9rem; } .parameters :is(td, th):is(:nth-child(4), :nth-child(6)) { text-align: left; }
+.parameters { font-size: .9rem; }
 .scroll { overflow-x: auto; }
 @media screen and (max-width: 480px) { th, td { padding-right: .55rem; } .summary { font-size: .92rem; } }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, 100%), 1fr)); gap: .6rem 1.2rem; }

@@ -7,11 +7,14 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "report/axis.hpp"
 #include "report/plots.hpp"
+#include "report/pose_errors.hpp"
 #include "report/shown_poses.hpp"
 #include "units.hpp"
 
@@ -83,74 +86,45 @@ Json arm_json(const Robot& robot) {
   return arm;
 }
 
-/// 1, 2 or 5 times a power of ten.
-double round_number(double v, bool up) {
-  const double power = std::pow(10, std::floor(std::log10(v) + 1e-9));
-  double below = power;
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (up && factor * power >= v * (1 - 1e-9)) return factor * power;
-    if (factor * power <= v * (1 + 1e-9)) below = factor * power;
-  }
-  return up ? 10 * power : below;
-}
-
-/// How many of all poses, drawn or not, lie in each class; null where there is nothing to see on a logarithmic axis.
+/// How many of all poses, drawn or not, lie in each bin; null where there is nothing to see on a logarithmic axis.
 /// \param lists  what is drawn, the smaller errors last: they set where a logarithmic axis begins
-Json histogram(const std::vector<const std::vector<double>*>& lists, bool log) {
-  double low = HUGE_VAL, high = -HUGE_VAL, sum = 0;
-  std::size_t count = 0;
+Json histogram_json(const std::vector<const std::vector<double>*>& lists, bool log) {
+  Scale scale{HUGE_VAL, -HUGE_VAL, log};
   for (const auto* list : lists) {
-    sum = 0;
-    count = 0;
     for (const double v : *list) {
-      if (!std::isfinite(v)) continue;
-      sum += v;
-      ++count;
-      if (log && !(v > 0)) continue;
-      low = std::min(low, v);
-      high = std::max(high, v);
+      if (!std::isfinite(v) || (log && !(v > 0))) continue;
+      scale.low = std::min(scale.low, v);
+      scale.high = std::max(scale.high, v);
     }
   }
-  if (!(high >= low)) {
+  if (!(scale.high >= scale.low)) {
     if (log) return nullptr;
-    low = high = 0;
+    scale.low = scale.high = 0;
   }
   if (log) {
-    // With round ends, as the axis has them. One lucky pose near zero must not press all the others together.
-    low = round_number(std::max(low, sum / static_cast<double>(std::max<std::size_t>(count, 1)) / 30), false);
-    high = round_number(high, true);
-    if (!(high > low)) high = 10 * low;
+    std::vector<double> finite;
+    std::copy_if(lists.back()->begin(), lists.back()->end(), std::back_inserter(finite),
+                 [](double v) { return std::isfinite(v); });
+    scale = log_error_scale(scale.low, scale.high, statistics_of(finite).mean);
   } else {
-    low = std::min(low, 0.0);
-    if (!(high > low)) high = low + 1;
+    scale.low = std::min(scale.low, 0.0);
+    if (!(scale.high > scale.low)) scale.high = scale.low + 1;
   }
-  const auto classes = static_cast<std::size_t>(
-      std::clamp(std::round(2 * std::cbrt(static_cast<double>(lists.front()->size())) + 8), 12.0, 40.0));
-  Json j{{"log", log}, {"low", low}, {"high", high}, {"counts", Json::array()}};
-  for (const auto* list : lists) {
-    std::vector<std::size_t> counts(classes);
-    for (const double v : *list) {
-      const double share =
-          log ? std::log(std::max(v, low) / low) / std::log(high / low) : (v - low) / (high - low);
-      const double at = std::isfinite(share) ? std::clamp(std::floor(share * static_cast<double>(classes)),
-                                                          0.0, static_cast<double>(classes - 1))
-                                             : 0;
-      ++counts[static_cast<std::size_t>(at)];
-    }
-    j["counts"].push_back(counts);
-  }
+  Json j{{"log", log}, {"low", scale.low}, {"high", scale.high}, {"counts", Json::array()}};
+  for (const auto* list : lists) j["counts"].push_back(histogram(*list, scale, bin_count(list->size())));
   return j;
 }
 
 /// Of one quantity: before and after together and each alone, on either axis.
-Json histograms(const std::vector<double>& before, const std::vector<double>& after, bool is_signed) {
+Json histograms(const ErrorPairs& errors, bool is_signed) {
+  const auto &before = errors.before, &after = errors.after;
   Json j{{"starts_log", !is_signed && is_logarithmic({before, after, "", std::nullopt})}};
   for (const bool log : {false, true}) {
     if (log && is_signed) continue;
     const std::string axis = log ? "_log" : "";
-    j["both" + axis] = histogram({&before, &after}, log);
-    j["before" + axis] = histogram({&before}, log);
-    j["after" + axis] = histogram({&after}, log);
+    j["both" + axis] = histogram_json({&before, &after}, log);
+    j["before" + axis] = histogram_json({&before}, log);
+    j["after" + axis] = histogram_json({&after}, log);
   }
   return j;
 }
@@ -180,77 +154,75 @@ Json covariate_json(const PageCovariate& c, const std::vector<std::size_t>& rows
   return {{"name", c.name}, {"values", values}};
 }
 
-Json set_json(const PagePoses& set, std::size_t limit) {
-  const std::vector<std::size_t> rows = shown_poses(set.poses, limit);
-  Json j{
-      {"title", set.title}, {"before_is", set.before}, {"after_is", set.after}, {"total", set.poses.size()}};
-  bool turned = !set.poses.empty();
-  bool lines = true;
-  std::array<std::vector<double>, 3> components_before, components_after;
-  std::vector<double> size_before, size_after, angle_before, angle_after;
-  for (const PagePose& p : set.poses) {
-    turned = turned && p.before_rad && p.after_rad;
-    lines = lines && p.line > 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      components_before[i].push_back(p.before_m[i] * 1e3);
-      components_after[i].push_back(p.after_m[i] * 1e3);
-    }
-    size_before.push_back(std::hypot(p.before_m[0], p.before_m[1], p.before_m[2]) * 1e3);
-    size_after.push_back(std::hypot(p.after_m[0], p.after_m[1], p.after_m[2]) * 1e3);
-  }
-  for (const PagePose& p : set.poses) {
-    if (!turned) break;
-    angle_before.push_back(degrees(*p.before_rad));
-    angle_after.push_back(degrees(*p.after_rad));
-  }
-  Json number = Json::array(), line = Json::array(), outlier = Json::array(), q = Json::array(),
-       before = Json::array(), after = Json::array(), turned_before = Json::array(),
-       turned_after = Json::array();
-  const double before_mm = unit_for(size_before, error_unit_mm),
-               after_mm = unit_for(size_after, error_unit_mm);
-  const double before_deg = unit_for(angle_before, angle_unit_deg),
-               after_deg = unit_for(angle_after, angle_unit_deg);
+Json counted(const std::vector<double>& values, const std::vector<std::size_t>& rows, double unit) {
+  Json list = Json::array();
+  for (const std::size_t k : rows) list.push_back(counted(values[k], unit));
+  return list;
+}
+
+/// Which poses of the data these are: their numbers where some are left out, their lines where they are known.
+void add_places(Json& j, const std::vector<PagePose>& poses, const std::vector<std::size_t>& rows) {
+  Json number = Json::array(), line = Json::array(), outlier = Json::array();
+  bool gapless = true;
   for (const std::size_t k : rows) {
-    const PagePose& p = set.poses[k];
+    if (poses[k].outlier) outlier.push_back(number.size());
     number.push_back(k + 1);
-    if (p.outlier) outlier.push_back(number.size() - 1);
-    append(q, p.q_rad);
-    for (std::size_t i = 0; i < 3; ++i) {
-      before.push_back(counted(components_before[i][k], before_mm));
-      after.push_back(counted(components_after[i][k], after_mm));
-    }
-    if (!turned) continue;
-    turned_before.push_back(counted(angle_before[k], before_deg));
-    turned_after.push_back(counted(angle_after[k], after_deg));
+    line.push_back(poses[k].line);
+    gapless = gapless && poses[k].line == poses[rows[0]].line + k - rows[0];
   }
-  // 1, 2, 3 … need not be said.
-  if (rows.size() < set.poses.size()) j["number"] = number;
+  if (rows.size() < poses.size()) j["number"] = number;
   // A file without gaps is its first line and a count.
-  bool gapless = lines;
-  for (const std::size_t k : rows)
-    gapless = gapless && set.poses[k].line == set.poses[rows[0]].line + k - rows[0];
-  if (gapless && !rows.empty()) {
-    j["first_line"] = set.poses[rows[0]].line - rows[0];
+  const bool lines = std::all_of(poses.begin(), poses.end(), [](const PagePose& p) { return p.line > 0; });
+  if (lines && gapless && !rows.empty()) {
+    j["first_line"] = poses[rows[0]].line - rows[0];
   } else if (lines) {
-    for (const std::size_t k : rows) line.push_back(set.poses[k].line);
     j["line"] = line;
   }
   j["outlier"] = outlier;
-  j["q"] = q;
+}
+
+/// Errors of the rows as whole numbers of their units.
+void add_errors(Json& j, const std::array<ErrorPairs, 3>& component, const ErrorPairs& size,
+                const ErrorPairs& angle, const std::vector<std::size_t>& rows) {
+  const double before_mm = unit_for(size.before, error_unit_mm),
+               after_mm = unit_for(size.after, error_unit_mm);
+  Json before = Json::array(), after = Json::array();
+  for (const std::size_t k : rows) {
+    for (const ErrorPairs& e : component) {
+      before.push_back(counted(e.before[k], before_mm));
+      after.push_back(counted(e.after[k], after_mm));
+    }
+  }
   j["before"] = before;
   j["after"] = after;
-  j["turned_before"] = turned_before;
-  j["turned_after"] = turned_after;
+  const double before_deg = unit_for(angle.before, angle_unit_deg),
+               after_deg = unit_for(angle.after, angle_unit_deg);
+  const std::vector<std::size_t> turned = angle.before.empty() ? std::vector<std::size_t>() : rows;
+  j["turned_before"] = counted(angle.before, turned, before_deg);
+  j["turned_after"] = counted(angle.after, turned, after_deg);
   j["before_unit_mm"] = before_mm;
   j["after_unit_mm"] = after_mm;
   j["before_unit_deg"] = before_deg;
   j["after_unit_deg"] = after_deg;
+}
+
+Json set_json(const PagePoses& set, std::size_t limit) {
+  const std::vector<std::size_t> rows = shown_poses(set.poses, limit);
+  const ErrorPairs size = position_errors(set), angle = orientation_errors(set);
+  const std::array<ErrorPairs, 3> component{component_errors(set, 0), component_errors(set, 1),
+                                            component_errors(set, 2)};
+  Json j{
+      {"title", set.title}, {"before_is", set.before}, {"after_is", set.after}, {"total", set.poses.size()}};
+  add_places(j, set.poses, rows);
+  j["q"] = Json::array();
+  for (const std::size_t k : rows) append(j["q"], set.poses[k].q_rad);
+  add_errors(j, component, size, angle, rows);
   if (set.noise_floor_m) j["floor_mm"] = short_number(*set.noise_floor_m * 1e3);
   if (!set.poses.empty()) {
-    j["histograms"]["size"] = histograms(size_before, size_after, false);
+    j["histograms"]["size"] = histograms(size, false);
     for (std::size_t i = 0; i < 3; ++i)
-      j["histograms"][std::string(1, "xyz"[i])] = histograms(components_before[i], components_after[i], true);
-    if (turned) j["histograms"]["turned"] = histograms(angle_before, angle_after, false);
+      j["histograms"][std::string(1, "xyz"[i])] = histograms(component[i], true);
+    if (!angle.before.empty()) j["histograms"]["turned"] = histograms(angle, false);
   }
   j["covariates"] = Json::array();
   for (const PageCovariate& c : set.covariates) j["covariates"].push_back(covariate_json(c, rows));

@@ -79,13 +79,15 @@ export function picture(page) {
   });
 }
 
-/** Pixels of a plot that uplot drew on. */
-export function inked(page, selector) {
-  return page.evaluate((at) => {
-    const canvas = document.querySelector(`${at} canvas`);
-    const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-    let count = 0;
-    for (let k = 3; k < data.length; k += 4) count += data[k] > 0;
-    return count;
-  }, selector);
+/** How many dots, bars and diamonds a plot has of which nothing lies outside its frame by more than their own size. */
+export function marks(page, selector) {
+  return page.evaluate((at) => [...document.querySelectorAll(`${at} svg`)].map((svg) => {
+    const frame = svg.querySelector('.frame').getBBox();
+    return [...svg.querySelectorAll('path:is(.before, .after, .apart)')].map((path) => {
+      const box = path.getBBox();
+      const inside = box.x >= frame.x - 8 && box.x + box.width <= frame.x + frame.width + 8
+        && box.y >= frame.y - 8 && box.y + box.height <= frame.y + frame.height + 8;
+      return inside ? path.getAttribute('d').match(/h0|H|Z/g).length : 0;
+    }).reduce((a, b) => a + b, 0);
+  }).reduce((a, b) => a + b, 0), selector);
 }

@@ -11,7 +11,7 @@ import {after, before, test} from 'node:test';
 
 import {chain, measuredPoint, toolFrame} from '../../host/report/web/src/chain.js';
 import {jointsOf, lengthText, norm, readData, shown, tickText} from '../../host/report/web/src/data.js';
-import {inked, launch, open, picture, settled} from './browser.mjs';
+import {launch, marks, open, picture, settled} from './browser.mjs';
 
 const source = process.env.FLEXCOMP_SOURCE_DIR;
 const folder = process.env.FLEXCOMP_PAGES;
@@ -175,7 +175,7 @@ for (const [command, file] of Object.entries(pages)) {
       assert.ok(seen.filled > 2000 && seen.colours > 20, `${where}: the arm is not to be seen: ${JSON.stringify(seen)}`);
       if (command !== 'plan') {
         assert.ok(seen.near.before > 30, `${where}: no errors: ${JSON.stringify(seen)}`);
-        for (const plot of ['.scatter', '.histogram']) assert.ok(await inked(page, plot) > 2000, `${where}: ${plot} is empty`);
+        for (const plot of ['.scatter', '.histogram']) assert.ok(await marks(page, plot) >= 24, `${where}: ${plot} is empty`);
       }
       const paper = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
       const [light] = paper.match(/\d+/g).map(Number);
@@ -271,9 +271,9 @@ test('errors against everything that was recorded, and a dot that is clicked', a
     for (let k = 0; k < names.length; ++k) {
       await against.selectOption(String(k));
       await settled(page);
-      assert.ok(await inked(page, '.scatter') > 1500, `${kind} against ${names[k]}`);
+      assert.equal(await marks(page, '.scatter'), 120, `${kind} against ${names[k]}`);
     }
-    assert.ok(await inked(page, '.histogram') > 1500);
+    assert.equal(await marks(page, '.histogram'), 32);
   }
   // Every dot says its pose, and is where that pose's value is; clicked, the arm goes there.
   await page.locator('.explore select').first().selectOption('size');
@@ -284,7 +284,7 @@ test('errors against everything that was recorded, and a dot that is clicked', a
   const inSight = async () => {
     await page.waitForTimeout(400);  // the page may still be scrolling to the arm
     await page.locator('.scatter').scrollIntoViewIfNeeded();
-    return page.locator('.scatter .u-over').boundingBox();
+    return page.locator('.scatter .frame').boundingBox();
   };
   let plot = await inSight();
   let clicked = 0;
@@ -317,7 +317,7 @@ test('a component has no logarithm, and what is left has classes of its own', as
   const {page, troubles, close} = await open(browser, at(pages.identify));
   const {sets: [set]} = dataOf(pages.identify);
   const box = page.getByLabel('logarithmic');
-  const panels = () => page.locator('.histogram .uplot').count();
+  const panels = () => page.locator('.histogram svg').count();
   assert.ok(await box.isChecked());
   assert.equal(await panels(), 1);
   for (const kind of ['x', 'y', 'z']) {
@@ -394,14 +394,14 @@ test('by keyboard and to those who listen', async () => {
   // The ring is where the dot is: on the axis, which reaches 3 % further than the values on both sides.
   const {q1_deg: q1} = csv('fitted.csv');
   const [low, high] = [Math.min(...q1), Math.max(...q1)];
-  const wide = await page.locator('.scatter .u-over').evaluate((e) => e.clientWidth);
+  const frame = await page.locator('.scatter .frame').evaluate((e) => ({x: e.x.baseVal.value, width: e.width.baseVal.value}));
   const against = page.locator('.explore select').nth(1);
   for (const joint of ['1', '0']) {
     await against.selectOption(joint);
     await settled(page);
   }
-  const ringed = await page.locator('.scatter .ring.chosen').first().evaluate((e) => parseFloat(e.style.left));
-  assert.ok(Math.abs(ringed / wide - ((q1[0] - low) / (high - low) + 0.03) / 1.06) < 0.01, `${ringed} of ${wide}`);
+  const ringed = await page.locator('.scatter .ring.chosen').first().evaluate((e) => e.cx.baseVal.value);
+  assert.ok(Math.abs((ringed - frame.x) / frame.width - ((q1[0] - low) / (high - low) + 0.03) / 1.06) < 0.01, `${ringed} of ${frame.width}`);
   await page.focus('.scatter');
   const values = [];
   for (let k = 0; k < 4; ++k) {
@@ -413,7 +413,7 @@ test('by keyboard and to those who listen', async () => {
   const number = (await page.textContent('.explore .readout')).match(/^Pose (\d+)/)[1];
   await page.keyboard.press('Enter');
   assert.match(await page.textContent('.view3d .readout'), new RegExp(`^Pose ${number} of 60`));
-  const place = (kind) => page.locator(`.scatter .ring.${kind}`).first().evaluate((e) => [e.style.left, e.style.top]);
+  const place = (kind) => page.locator(`.scatter .ring.${kind}`).first().evaluate((e) => [e.cx.baseVal.value, e.cy.baseVal.value]);
   assert.deepEqual(await place('chosen'), await place('found'));
   assert.deepEqual(troubles, []);
   await close();
@@ -462,7 +462,7 @@ test('rows that lie apart are marked, and errors that cannot be seen are spoken 
   writeFileSync(at('apart.html'), even.replace('"outlier":[]', '"outlier":[3,10]'));
   const marked = await open(browser, at('apart.html'), {width: 500});
   const plain = await open(browser, at(pages.identify), {width: 500});
-  assert.ok(await inked(marked.page, '.scatter') > await inked(plain.page, '.scatter') + 80, 'diamonds');
+  assert.equal(await marks(marked.page, '.scatter'), await marks(plain.page, '.scatter') + 4, 'diamonds');
   assert.match(await marked.page.innerText('.legend'), /lies far from the rest/);
   assert.notEqual((await picture(marked.page)).sum, (await picture(plain.page)).sum);
   for (const one of [marked, plain]) {
@@ -527,7 +527,7 @@ test('the plan has beams, bodies and all its poses', async () => {
 
 test('several sets: one is chosen, each has its own plots', async () => {
   const {page, troubles, close} = await open(browser, at(pages.report));
-  assert.equal(await page.locator('.explore .uplot').count(), 4);
+  assert.equal(await page.locator('.explore svg').count(), 4);
   assert.deepEqual(dataOf(pages.report).sets.map((s) => s.covariates.some((c) => c.name === 'payload [kg]')), [true, true]);
   const first = await picture(page);
   await page.locator('.view3d select').selectOption({label: 'Back'});
@@ -602,8 +602,8 @@ test('without WebGL a sentence stands there, and the plots work', async () => {
     const {page, troubles, close} = await open(blind, at(pages.identify));
     assert.match(await page.innerText('.view3d'), /draws no 3-D here/);
     assert.equal(await page.locator('.stage').count(), 0);
-    assert.ok(await inked(page, '.scatter') > 2000);
-    const plot = await page.locator('.scatter .u-over').boundingBox();
+    assert.equal(await marks(page, '.scatter'), 120);
+    const plot = await page.locator('.scatter .frame').boundingBox();
     assert.doesNotMatch(await page.textContent('.explore .readout'), /the arm/);
     await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
     await page.focus('.scatter');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // node bundle.mjs PACKAGES OUT.cpp
 //
-// Bundles src/ with three and uplot (from PACKAGES/node_modules) into one script and one style sheet, and writes them as
+// Bundles src/ with three (from PACKAGES/node_modules) into one script and one style sheet, and writes them as
 // the C++ source that web_bundle.hpp declares.
 import {createRequire} from 'node:module';
 import {readFileSync, writeFileSync} from 'node:fs';
@@ -13,11 +13,8 @@ const here = dirname(fileURLToPath(import.meta.url));
 const {buildSync} = createRequire(join(packages, 'package.json'))('esbuild');
 
 // What is bundled may be passed on with its licence, and every page is a copy.
-const notice = ['three', 'uplot'].map((name) => {
-  const {version} = JSON.parse(readFileSync(join(packages, 'node_modules', name, 'package.json'), 'utf8'));
-  const licence = readFileSync(join(packages, 'node_modules', name, 'LICENSE'), 'utf8').trim();
-  return `${name} ${version}\n\n${licence}`;
-}).join('\n\n');
+const {version} = JSON.parse(readFileSync(join(packages, 'node_modules/three/package.json'), 'utf8'));
+const notice = `three ${version}\n\n${readFileSync(join(packages, 'node_modules/three/LICENSE'), 'utf8').trim()}`;
 if (notice.includes('*/')) throw new Error('a licence ends the comment that it stands in');
 
 const {outputFiles} = buildSync({

@@ -19,14 +19,9 @@ export function colours() {
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
-/** Calls when the screen takes another scheme. */
-export function onScheme(changed) {
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
-}
-
-/** The same, and when the page goes to paper and comes back; what is called draws at once. */
+/** Calls when the screen takes another scheme, when the page goes to paper and when it comes back. */
 export function onColours(changed) {
-  onScheme(changed);
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
   paper.addEventListener('change', changed);
   for (const [event, now] of [['beforeprint', true], ['afterprint', false]]) {
     window.addEventListener(event, () => {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/** element('p', {class: 'note'}, 'text', child…); on… attributes are listeners. */
-export function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
+function filled(made, attributes, children) {
   for (const [key, value] of Object.entries(attributes)) {
     if (key.startsWith('on')) made.addEventListener(key.slice(2), value);
     else if (value === true) made.setAttribute(key, '');
@@ -10,6 +8,11 @@ export function element(name, attributes = {}, ...children) {
   made.append(...children);
   return made;
 }
+
+/** element('p', {class: 'note'}, 'text', child…); on… attributes are listeners. */
+export const element = (name, attributes = {}, ...children) => filled(document.createElement(name), attributes, children);
+export const svgElement = (name, attributes = {}, ...children) =>
+  filled(document.createElementNS('http://www.w3.org/2000/svg', name), attributes, children);
 
 let names = 0;
 /** A group of choices of which one holds, as buttons beside each other. */

@@ -1,33 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-import {
-  AmbientLight, BoxGeometry, BufferGeometry, CapsuleGeometry, CircleGeometry, Color, ConeGeometry, CylinderGeometry,
-  DirectionalLight, DoubleSide, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh,
-  MeshLambertMaterial, PerspectiveCamera, Quaternion, Scene, SphereGeometry, Vector3, WebGLRenderer,
-} from 'three';
+import {AmbientLight, DirectionalLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer} from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
-import {mergeGeometries} from 'three/addons/utils/BufferGeometryUtils.js';
-import {chain, measuredPoint, placed, toolFrame} from './chain.js';
+import {fitCamera, turnCamera} from './camera.js';
+import {chain, measuredPoint, placed} from './chain.js';
 import {colours, onColours, onPaper} from './colours.js';
 import {jointsOf, lengthText, norm, roundDown} from './data.js';
 import {check, choice, element, select} from './elements.js';
-
-const up = new Vector3(0, 1, 0);  // what three's cylinders stand along
-const vector = (p) => new Vector3(p[0], p[1], p[2]);
-
-/** Brings a body that stands on +y from 0 to 1 from one place to another. */
-function between(from, to, thickness) {
-  const along = to.clone().sub(from);
-  const length = along.length();
-  const turn = new Quaternion().setFromUnitVectors(up, length > 0 ? along.divideScalar(length) : up);
-  return new Matrix4().compose(from, turn, new Vector3(thickness, Math.max(length, 1e-9), thickness));
-}
-
-/** An arrow from 0 to 1 on +y, its shaft one thick. */
-function arrowGeometry(corners) {
-  const shaft = new CylinderGeometry(0.5, 0.5, 0.7, corners, 1, true).translate(0, 0.35, 0);
-  const tip = new ConeGeometry(1.5, 0.3, corners).translate(0, 0.85, 0);
-  return mergeGeometries([shaft, tip]);
-}
+import {SceneContent, vector} from './scene.js';
 
 /** How many times as long an error of the usual size is well seen. */
 const lengthening = (usual, size) => Math.max(roundDown((0.2 * size) / usual), 1);
@@ -131,7 +110,7 @@ export class ArmView {
 
   /** "200 times", for the slider and the words. */
   timesText() {
-    const factor = this.lengths[this.length];
+    const {factor} = this;
     return factor === 1 ? 'as they are' : `${factor.toLocaleString('en')} times`;
   }
 
@@ -212,198 +191,20 @@ export class ArmView {
     this.tell();
   }
 
-  material(ink, opacity = 1) {
-    return new MeshLambertMaterial({color: new Color(ink), transparent: opacity < 1, opacity, depthWrite: opacity === 1});
-  }
-
-  /** Everything anew: a few dozen bodies and some instanced meshes. */
+  /** Everything anew. */
   build() {
     if (this.content) {
       this.scene.remove(this.content);
-      this.content.traverse((o) => { o.geometry?.dispose(); o.material?.dispose(); });
+      this.content.dispose();
     }
-    this.content = new Group();
+    this.content = new SceneContent(this);
     this.scene.add(this.content);
-    const {set, plan} = this.now;
-    this.addGround();
-    this.addArm(jointsOf(set, this.pose));
-    if (plan) this.addPlan();
-    else this.addErrors();
     this.describe();
   }
 
-  addGround() {
-    const c = this.colours;
-    const fixed = this.arm.capsules.filter((b) => b.frame === 0);
-    const floor = Math.min(0, ...fixed.flatMap((b) => [b.from[2], b.to[2]]));
-    this.square = roundDown(this.size / 4);
-    const half = Math.ceil((1.1 * this.size) / this.square);
-    const lines = [];
-    for (let k = -half; k <= half; ++k) {
-      const at = k * this.square;
-      const end = half * this.square;
-      lines.push(at, -end, floor, at, end, floor, -end, at, floor, end, at, floor);
-    }
-    this.addLines(lines, c.grid, 1);
-    const axis = 0.2 * this.size;
-    for (const [ink, to] of [[c.x, [axis, 0, 0]], [c.y, [0, axis, 0]], [c.z, [0, 0, axis]]]) {
-      this.addBody(arrowGeometry(8), this.material(ink), between(new Vector3(), vector(to), 0.009 * this.size));
-    }
-  }
-
-  addLines(coordinates, ink, opacity) {
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new Float32BufferAttribute(coordinates, 3));
-    this.content.add(new LineSegments(geometry, new LineBasicMaterial({color: new Color(ink), transparent: opacity < 1, opacity})));
-  }
-
-  addBody(geometry, material, matrix) {
-    const mesh = new Mesh(geometry, material);
-    mesh.matrixAutoUpdate = false;
-    mesh.matrix.copy(matrix);
-    this.content.add(mesh);
-    return mesh;
-  }
-
-  addRod(from, to, thickness, material) {
-    if (from.distanceTo(to) < 1e-6) return;
-    this.addBody(new CylinderGeometry(0.5, 0.5, 1, 16).translate(0, 0.5, 0), material, between(from, to, thickness));
-  }
-
-  addBall(at, radius, material) {
-    this.addBody(new SphereGeometry(radius, 20, 14), material, new Matrix4().setPosition(at));
-  }
-
-  /** Links along z and x of their frames, joints about their axes, tool and reflectors; bodies as glass around them. */
-  addArm(q) {
-    const c = this.colours;
-    const thick = 0.035 * this.size;
-    const frames = chain(this.arm, q);
-    const link = this.material(c.axis);
-    const joint = this.material(c.soft);
-    for (let i = 1; i < frames.length; ++i) {
-      const from = vector(frames[i - 1].origin);
-      const elbow = vector(frames[i].elbow);
-      this.addRod(from, elbow, thick, link);
-      this.addRod(elbow, vector(frames[i].origin), thick, link);
-      this.addBall(elbow, 0.5 * thick, link);
-      const axis = vector(frames[i - 1].z).multiplyScalar(0.9 * thick);
-      this.addRod(from.clone().sub(axis), from.clone().add(axis), 1.5 * thick, joint);
-    }
-    const flange = vector(frames[6].origin);
-    this.addBall(flange, 0.6 * thick, link);
-    const tool = toolFrame(this.arm, frames[6]);
-    const plain = this.material(c.ink);
-    const tip = vector(placed(tool, this.now.set.point ?? [0, 0, 0]));
-    this.addRod(flange, vector(tool.origin), 0.3 * thick, plain);
-    this.addRod(vector(tool.origin), tip, 0.3 * thick, plain);
-    for (const p of this.arm.reflectors) {
-      const at = vector(placed(tool, p));
-      this.addRod(vector(tool.origin), at, 0.25 * thick, plain);
-      this.addBall(at, 0.35 * thick, plain);
-    }
-    this.addBall(tip, 0.35 * thick, plain);
-    if (!this.shown.bodies) return;
-    const glass = this.material(c.axis, 0.22);
-    for (const body of this.arm.capsules) this.addCapsule(body, frames[body.frame], glass);
-  }
-
-  addCapsule(body, frame, material) {
-    const from = vector(frame ? placed(frame, body.from) : body.from);
-    const to = vector(frame ? placed(frame, body.to) : body.to);
-    if (body.radius > 4 * this.size) {
-      this.addSurface(from, to, body.radius, material);
-      return;
-    }
-    const length = from.distanceTo(to);
-    const turn = new Quaternion().setFromUnitVectors(up, length > 0 ? to.clone().sub(from).divideScalar(length) : up);
-    this.addBody(new CapsuleGeometry(body.radius, length, 8, 24), material,
-      new Matrix4().compose(from.clone().add(to).multiplyScalar(0.5), turn, new Vector3(1, 1, 1)));
-  }
-
-  /** A floor or wall is a capsule so thick that it is flat: what of it is near the arm. */
-  addSurface(from, to, radius, material) {
-    const along = to.clone().sub(from);
-    const t = along.lengthSq() > 0 ? Math.min(Math.max(-from.dot(along) / along.lengthSq(), 0), 1) : 0;
-    const axis = from.clone().addScaledVector(along, t);
-    const normal = axis.clone().negate().normalize();
-    const at = axis.addScaledVector(normal, radius);
-    const flat = material.clone();
-    flat.side = DoubleSide;
-    this.addBody(new CircleGeometry(1.6 * this.size, 48), flat, new Matrix4().compose(at,
-      new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal), new Vector3(1, 1, 1)));
-  }
-
-  addErrors() {
-    const {set} = this.now;
-    const c = this.colours;
-    const many = set.count > 500;
-    const factor = this.lengths[this.length] * 1e-3;
-    const thick = (many ? 0.0025 : 0.006) * this.size;
-    const dots = new InstancedMesh(new SphereGeometry(0.8 * thick, many ? 5 : 10, many ? 4 : 8), this.material(c.soft), set.count);
-    const matrix = new Matrix4();
-    this.points.forEach((p, k) => dots.setMatrixAt(k, matrix.makeTranslation(p.x, p.y, p.z)));
-    this.content.add(dots);
-    if (set.outlier.size > 0) {
-      const odd = this.material(c.ink);
-      for (const k of set.outlier) this.addBall(this.points[k], 0.009 * this.size, odd);
-    }
-    for (const which of ['before', 'after']) {
-      if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
-      const material = this.material(c[which]);
-      material.emissive.set(c[which]);  // as the legend has it, also where no light falls
-      material.emissiveIntensity = 0.5;
-      const arrows = new InstancedMesh(arrowGeometry(many ? 4 : 8), material, set.count);
-      this.points.forEach((p, k) => {
-        const to = vector(set.errorInBase(which, k)).multiplyScalar(factor);
-        // A short arrow is a thin one, or it would be a disc.
-        arrows.setMatrixAt(k, between(p, to.clone().add(p), Math.min(thick, 0.25 * to.length())));
-      });
-      this.content.add(arrows);
-    }
-  }
-
-  addPlan() {
-    const plan = this.now.set;
-    const c = this.colours;
-    const skeleton = (poses) => {
-      const lines = [];
-      for (let k = 0; k < poses.count; ++k) {
-        const frames = chain(this.arm, jointsOf(poses, k));
-        const stops = frames.flatMap((f) => (f.elbow ? [f.elbow, f.origin] : [f.origin]));
-        stops.push(toolFrame(this.arm, frames[6]).origin);
-        for (let s = 1; s < stops.length; ++s) lines.push(...stops[s - 1], ...stops[s]);
-      }
-      return lines;
-    };
-    const reflectors = (k) => {
-      const tool = toolFrame(this.arm, chain(this.arm, jointsOf(plan, k))[6]);
-      return this.arm.reflectors.length > 0 ? this.arm.reflectors.map((p) => placed(tool, p)) : [tool.origin];
-    };
-    if (this.shown.poses) {
-      this.addLines(skeleton(plan), c.after, 0.45);
-      if (plan.known.count > 0) this.addLines(skeleton(plan.known), c.before, 0.35);
-      const dots = this.material(c.after);
-      for (const p of this.points) this.addBall(p, 0.012 * this.size, dots);
-      const before = this.material(c.before);
-      for (const p of this.known) this.addBall(p, 0.009 * this.size, before);
-    }
-    if (this.shown.bodies) {
-      const glass = this.material(c.soft, 0.3);
-      for (const body of plan.obstacles) this.addCapsule(body, null, glass);
-    }
-    if (!plan.tracker) return;
-    const tracker = vector(plan.tracker);
-    const head = 0.05 * this.size;
-    this.addBody(new BoxGeometry(1.2 * head, 1.2 * head, 2 * head), this.material(c.soft),
-      new Matrix4().setPosition(tracker.clone().setZ(tracker.z - 1.2 * head)));
-    this.addBall(tracker, 0.5 * head, this.material(c.y));
-    const beams = this.material(c.y);
-    for (const p of reflectors(this.pose)) this.addRod(tracker, vector(p), 0.006 * this.size, beams);
-    if (!this.shown.poses) return;
-    const faint = [];
-    for (let k = 0; k < plan.count; ++k) for (const p of reflectors(k)) faint.push(...plan.tracker, ...p);
-    this.addLines(faint, c.y, 0.25);
+  /** How many times as long as they are errors are drawn. */
+  get factor() {
+    return this.lengths?.[this.length];
   }
 
   describe() {
@@ -426,15 +227,15 @@ export class ArmView {
     list.push(element('li', {}, 'axes of the base: ', element('span', {class: 'mark x'}), ' x ',
       element('span', {class: 'mark y'}), ' y ', element('span', {class: 'mark z'}), ' z'));
     this.legend.replaceChildren(...list);
-    const squares = `One square of the grid: ${mm(this.square)} of the arm`;
+    const squares = `One square of the grid: ${mm(this.content.square)} of the arm`;
     if (plan) {
       this.words.textContent = `${squares}. The arm with its bodies stands in the pose chosen below; the others are lines.`;
     } else {
-      const factor = this.lengths[this.length];
+      const {factor} = this;
       const times = this.timesText();
       this.lengthSlider.setAttribute('aria-valuetext', times);
       this.words.textContent = `Errors are drawn ${factor === 1 ? 'as long' : `${times} as long`} as they are. ${squares}, `
-        + `${mm(this.square / factor)} of error. ${this.tooShort()}The arm is the nominal one.`
+        + `${mm(this.content.square / factor)} of error. ${this.tooShort()}The arm is the nominal one.`
         + (set.count < set.total ? ` ${set.count} of ${set.total} poses are drawn.` : '');
     }
     this.poseSlider.setAttribute('aria-valuetext', `pose ${plan ? this.pose + 1 : set.number[this.pose]}`);
@@ -461,7 +262,7 @@ export class ArmView {
       if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
       if (!set[which].some((v) => v !== 0)) {
         words.push(`There are no errors ${which}. `);
-      } else if (this.usual(which) * this.lengths[this.length] < 0.01 * this.size) {
+      } else if (this.usual(which) * this.factor < 0.01 * this.size) {
         words.push(`The errors ${which} are too short to be seen at this length`
           + `${onPaper() || this.shown.errors === which ? '' : `: choose “${which}”`}. `);
       }
@@ -473,21 +274,15 @@ export class ArmView {
     const step = Math.PI / 18;
     const turns = {ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step]}[event.key];
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (turns) this.turn(...turns);
+    if (turns) this.turn(turns);
     else if (event.key === '+' || event.key === '=') this.approach(0.8);
     else if (event.key === '-') this.approach(1.25);
     else return;
     event.preventDefault();
   }
 
-  /** Around the upright axis, and up or down, rad. */
-  turn(around, down) {
-    const from = this.camera.position.clone().sub(this.controls.target);
-    const distance = from.length();
-    const angle = Math.atan2(from.y, from.x) + around;
-    const steep = Math.min(Math.max(Math.acos(from.z / distance) + down, 0.02), Math.PI - 0.02);
-    this.camera.position.set(Math.sin(steep) * Math.cos(angle), Math.sin(steep) * Math.sin(angle), Math.cos(steep))
-      .multiplyScalar(distance).add(this.controls.target);
+  turn(by) {
+    turnCamera(this.camera, this.controls.target, ...by);
     this.controls.update();
     this.render();
   }
@@ -507,8 +302,8 @@ export class ArmView {
     if (found >= 0) this.choosePose(found);
   }
 
-  /** Turns the view and comes as near as still shows all points, the arm, and the instrument. */
-  lookFrom(from) {
+  /** What the picture must show: all points, the arm, its bodies and errors, and the instrument. */
+  placesToShow() {
     const {set, plan} = this.now;
     const frames = chain(this.arm, jointsOf(set, this.pose));
     const places = [new Vector3(), ...this.points, ...this.known, ...frames.map((f) => vector(f.origin)),
@@ -526,7 +321,7 @@ export class ArmView {
     }
     for (const which of plan ? [] : ['before', 'after']) {
       if (this.shown.errors !== 'both' && this.shown.errors !== which) continue;
-      const factor = this.lengths[this.length] * 1e-3;
+      const factor = this.factor * 1e-3;
       // One that is far longer than the others may leave the picture, or nothing else were seen.
       this.points.forEach((p, k) => places.push(
         vector(set.errorInBase(which, k)).multiplyScalar(factor).clampLength(0, 0.6 * this.size).add(p)));
@@ -534,32 +329,12 @@ export class ArmView {
     for (let k = 0; k < (plan ? set.known.count : 0); ++k) {
       places.push(...chain(this.arm, jointsOf(set.known, k)).map((f) => vector(f.origin)));
     }
-    const towards = vector(from).normalize();
-    this.camera.position.copy(towards);
-    this.camera.lookAt(0, 0, 0);
-    this.camera.updateMatrixWorld();
-    const [right, above] = [0, 1].map((k) => new Vector3().setFromMatrixColumn(this.camera.matrixWorld, k));
-    const tall = 0.92 * Math.tan((this.camera.fov * Math.PI) / 360);
-    const wide = tall * this.camera.aspect;
-    // Each place must lie inside the pyramid of the view: middle and distance follow from the outermost ones, first
-    // without perspective.
-    const extent = (axis) => {
-      const at = places.map((p) => p.dot(axis));
-      return [at.reduce((x, y) => Math.min(x, y)), at.reduce((x, y) => Math.max(x, y))];
-    };
-    const middle = new Vector3();
-    for (const axis of [right, above, towards]) middle.addScaledVector(axis, extent(axis).reduce((x, y) => x + y) / 2);
-    let distance = 0.3 * this.size;
-    for (const p of places) {
-      const at = p.clone().sub(middle);
-      const depth = at.dot(towards) + 0.08 * this.size;
-      distance = Math.max(distance, depth + Math.abs(at.dot(right)) / wide, depth + Math.abs(at.dot(above)) / tall);
-    }
-    this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(towards, distance);
-    this.camera.near = distance / 100;
-    this.camera.far = distance * 20;
-    this.camera.updateProjectionMatrix();
+    return places;
+  }
+
+  /** Turns the view and comes as near as still shows all of that. */
+  lookFrom(from) {
+    this.controls.target.copy(fitCamera(this.camera, from, this.placesToShow(), this.size));
     this.from = from;
     this.controls.update();
     this.render();
