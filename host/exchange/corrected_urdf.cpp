@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <set>
 #include <utility>
@@ -202,14 +203,14 @@ CorrectedUrdf correct_urdf(const std::string& path, const UrdfLinks& links, cons
   } else if (behind < end) {
     put(arm.steps[behind], tip * inverse(product(arm.steps, behind + 1, end)));
   }
-  const std::string text = read_file(path);
-  out.text = with_origins(text, origins);
-  if (behind == end && (tip.position.norm() > rounding ||
-                        angle_between(tip.rotation, Eigen::Matrix3d::Identity()) > rounding)) {
-    out.added_tip = true;
-    out.tip = arm.tip + "_calibrated";
-    out.text = with_fixed_link(out.text, arm.tip, out.tip, tip);
+  std::optional<AddedLink> added;
+  out.added_tip = behind == end && (tip.position.norm() > rounding ||
+                                    angle_between(tip.rotation, Eigen::Matrix3d::Identity()) > rounding);
+  if (out.added_tip) {
+    added = {arm.tip, "_calibrated", tip};
+    out.tip += added->suffix;
   }
+  out.text = with_origins(path, read_file(path), origins, added);
   return out;
 }
 

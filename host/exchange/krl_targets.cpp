@@ -12,8 +12,8 @@
 #include <system_error>
 #include <utility>
 
-#include "exchange/point_list.hpp"
 #include "exchange/program_text.hpp"
+#include "exchange/rotation_angles.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

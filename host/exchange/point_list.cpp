@@ -370,27 +370,6 @@ class PointReader {
 
 }  // namespace
 
-Eigen::Quaterniond rotation(AngleConvention convention, const Eigen::Vector3d& angles_rad) {
-  const Eigen::AngleAxisd x(angles_rad.x(), Eigen::Vector3d::UnitX());
-  const Eigen::AngleAxisd y(angles_rad.y(), Eigen::Vector3d::UnitY());
-  const Eigen::AngleAxisd z(angles_rad.z(), Eigen::Vector3d::UnitZ());
-  Eigen::Quaterniond q;
-  if (convention == AngleConvention::fixed_xyz) {
-    q = z * y * x;
-  } else if (convention == AngleConvention::moving_xyz) {
-    q = x * y * z;
-  } else {
-    const double angle = angles_rad.norm();
-    q = angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, angles_rad / angle))
-                  : Eigen::Quaterniond::Identity();
-  }
-  return *unit_quaternion(std::array<double, 4>{q.w(), q.x(), q.y(), q.z()});
-}
-
-Eigen::Quaterniond kuka_rotation(const Eigen::Vector3d& abc_rad) {
-  return rotation(AngleConvention::fixed_xyz, abc_rad.reverse());
-}
-
 const std::vector<std::string>& point_column_names() {
   static const std::vector<std::string> all = [] {
     std::vector<std::string> names{"-"};

@@ -13,20 +13,11 @@
 #include <vector>
 
 #include "exchange/delimited_text.hpp"
+#include "exchange/rotation_angles.hpp"
 #include "exchange/time_stamp.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
-
-/// What three angles rx, ry, rz mean. A file does not tell.
-enum class AngleConvention {
-  fixed_xyz,       ///< Rot(z,rz) Rot(y,ry) Rot(x,rx): about fixed axes x, y, z; SpatialAnalyzer, URDF
-  moving_xyz,      ///< Rot(x,rx) Rot(y,ry) Rot(z,rz): about the axes as they move; Stäubli
-  rotation_vector  ///< one turn about (rx, ry, rz) by its length; Universal Robots
-};
-Eigen::Quaterniond rotation(AngleConvention convention, const Eigen::Vector3d& angles_rad);
-/// KUKA's A, B, C: Rot(z,a) Rot(y,b) Rot(x,c).
-Eigen::Quaterniond kuka_rotation(const Eigen::Vector3d& abc_rad);
 
 struct PointListOptions {
   DialectChoice dialect;

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <string_view>
-#include <utility>
 
 #include "exchange/program_text.hpp"
+#include "exchange/rotation_angles.hpp"
+#include "exchange/text_edits.hpp"
 #include "files/read_file.hpp"
 #include "files/text.hpp"
 #include "input_error.hpp"
@@ -33,15 +33,6 @@ std::string turn_word(unsigned turn, std::string_view old) {
   const std::size_t digits = old.size() - 3;
   return old[1] == 'B' || old[1] == 'b' ? fmt::format("'{}{:0{}b}'", old[1], turn, digits)
                                         : fmt::format("'{}{:0{}X}'", old[1], turn, digits);
-}
-
-/// A, B, C of Rot(z,a) Rot(y,b) Rot(x,c); where b is a right angle c makes up for a.
-Eigen::Vector3d kuka_angles(const Eigen::Matrix3d& r) {
-  const double a = std::atan2(r(1, 0), r(0, 0));
-  const double s = std::sin(a);
-  const double c = std::cos(a);
-  return {a, std::atan2(-r(2, 0), c * r(0, 0) + s * r(1, 0)),
-          std::atan2(s * r(0, 2) - c * r(1, 2), c * r(1, 1) - s * r(0, 1))};
 }
 
 }  // namespace
@@ -84,49 +75,40 @@ TargetProgram read_program(const std::string& path, ProgramLanguage language) {
 }
 
 std::string program_text(const TargetProgram& program, const std::vector<ProgramTarget>& corrected) {
-  std::map<std::size_t, std::pair<std::size_t, std::string>> edits;
-  const auto put = [&edits](const TextSpan& span, const std::string& text) {
-    edits[span.begin] = {span.end, text};
-  };
+  TextEdits edits;
   for (std::size_t n = 0; n < corrected.size(); ++n) {
     const ProgramTarget& t = corrected[n];
     const ProgramTarget& old = program.targets[n];
     if (!t.pose) {
-      for (std::size_t j = 0; j < joint_count; ++j) put(t.numbers[j], six_decimals(degrees(t.q_rad[j])));
+      for (std::size_t j = 0; j < joint_count; ++j)
+        edits.replace(t.numbers[j], six_decimals(degrees(t.q_rad[j])));
       continue;
     }
     for (std::size_t k = 0; k < 3; ++k)
-      put(t.numbers[k], six_decimals(t.position_m[static_cast<Eigen::Index>(k)] * 1e3));
+      edits.replace(t.numbers[k], six_decimals(t.position_m[static_cast<Eigen::Index>(k)] * 1e3));
     if (program.language == ProgramLanguage::kuka) {
-      const Eigen::Vector3d abc = kuka_angles(t.orientation.toRotationMatrix());
+      const Eigen::Vector3d abc = roll_pitch_yaw(t.orientation.toRotationMatrix()).reverse();
       for (std::size_t k = 0; k < 3; ++k)
-        put(t.numbers[3 + k], six_decimals(degrees(abc[static_cast<Eigen::Index>(k)])));
+        edits.replace(t.numbers[3 + k], six_decimals(degrees(abc[static_cast<Eigen::Index>(k)])));
     } else {
       const Eigen::Quaterniond& q = t.orientation;
       const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
       // 1e-9 of a quaternion is what 1e-6 deg is of an angle.
-      for (std::size_t k = 0; k < 4; ++k) put(t.numbers[3 + k], fmt::format("{:.9f}", wxyz[k]));
+      for (std::size_t k = 0; k < 4; ++k) edits.replace(t.numbers[3 + k], fmt::format("{:.9f}", wxyz[k]));
     }
     // A word that is right stays as it is written.
     if (t.turn && t.turn_number && t.turn != old.turn) {
       const std::string_view word =
           std::string_view(program.text)
               .substr(t.turn_number->begin, t.turn_number->end - t.turn_number->begin);
-      put(*t.turn_number, turn_word(*t.turn, word));
+      edits.replace(*t.turn_number, turn_word(*t.turn, word));
     }
     for (std::size_t k = 0; k < t.quadrant_numbers.size(); ++k) {
       if ((*t.quadrant)[k] != (*old.quadrant)[k])
-        put(t.quadrant_numbers[k], fmt::format("{}", (*t.quadrant)[k]));
+        edits.replace(t.quadrant_numbers[k], fmt::format("{}", (*t.quadrant)[k]));
     }
   }
-  std::string out;
-  std::size_t at = 0;
-  for (const auto& [begin, edit] : edits) {
-    out.append(program.text, at, begin - at);
-    out += edit.second;
-    at = edit.first;
-  }
-  return out.append(program.text, at);
+  return edits.applied_to(program.text);
 }
 
 unsigned turn_of(const std::array<double, joint_count>& q_rad, unsigned before) {

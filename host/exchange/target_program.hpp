@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "files/text.hpp"
+#include "exchange/text_edits.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {

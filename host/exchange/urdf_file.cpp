@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "exchange/urdf_file.hpp"
 
-#include <console_bridge/console.h>
 #include <fmt/format.h>
-#include <tinyxml.h>
-#include <urdf_parser/urdf_parser.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <exception>
-#include <map>
 
-#include "files/read_file.hpp"
+#include "exchange/urdf_tree.hpp"
 #include "input_error.hpp"
 #include "model/frames.hpp"
-#include "nearest.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -26,157 +19,36 @@ namespace {
 /// Limits wider than this are a way of writing "none".
 constexpr double widest_rad = 20 * pi;
 
-/// Keeps what liburdfdom would print.
-class Listener : public console_bridge::OutputHandler {
- public:
-  Listener() { console_bridge::useOutputHandler(this); }
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
-  ~Listener() override { console_bridge::restorePreviousOutputHandler(); }
-
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) said_.push_back(text);
-  }
-  std::string said() const { return fmt::format("{}", fmt::join(said_, "; ")); }
-
- private:
-  std::vector<std::string> said_;
-};
-
-const char* kind(const urdf::Joint& joint) {
-  switch (joint.type) {
-    case urdf::Joint::REVOLUTE:
-      return "revolute";
-    case urdf::Joint::CONTINUOUS:
-      return "continuous";
-    case urdf::Joint::PRISMATIC:
-      return "prismatic";
-    case urdf::Joint::FLOATING:
-      return "floating";
-    case urdf::Joint::PLANAR:
-      return "planar";
-    case urdf::Joint::FIXED:
-      return "fixed";
-    default:
-      return "of no known type";
-  }
-}
-
-bool is_turning(const urdf::Joint& joint) {
-  return joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS;
-}
-
-Eigen::Vector3d vector(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
-
-Pose<double> pose(const urdf::Pose& p) {
-  const urdf::Rotation& q = p.rotation;
-  return {Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix(), vector(p.position)};
-}
-
-using LinkPtr = urdf::LinkConstSharedPtr;
-
-/// A tree of links that knows its file.
-class Tree {
- public:
-  explicit Tree(const std::string& path) : path_(path) {
-    const std::string text = read_file(path);
-    if (text.empty()) throw InputError(path, 0, "", "a file that can be read", "nothing in it");
-    // Once for the lines, which liburdfdom does not tell.
-    TiXmlDocument xml;
-    xml.Parse(text.c_str());
-    if (xml.Error()) {
-      throw InputError(path, static_cast<std::size_t>(std::max(0, xml.ErrorRow())), "", "XML",
-                       xml.ErrorDesc());
-    }
-    const TiXmlElement* robot = xml.RootElement();
-    if (robot == nullptr || robot->ValueStr() != "robot") {
-      throw InputError(path, 1, "", "a URDF, whose first element is <robot>",
-                       robot == nullptr ? "no element" : "<" + robot->ValueStr() + ">");
-    }
-    for (const TiXmlElement* e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
-      if (e->ValueStr().starts_with("xacro:")) {
-        throw InputError(path, static_cast<std::size_t>(std::max(0, e->Row())), "",
-                         "a URDF, as xacro writes it out (xacro FILE > FILE.urdf)",
-                         "<" + e->ValueStr() + ">");
-      }
-      const char* name = e->Attribute("name");
-      if (name != nullptr)
-        line_[e->ValueStr() + " " + name] = static_cast<std::size_t>(std::max(0, e->Row()));
-    }
-    Listener listener;
-    try {
-      model_ = urdf::parseURDF(text);
-    } catch (const std::exception& e) {
-      throw InputError(path, 0, "", "a URDF", e.what());
-    }
-    if (!model_ || !model_->getRoot()) throw InputError(path, 0, "", "a URDF", listener.said());
-  }
-
-  const urdf::ModelInterface& model() const { return *model_; }
-
-  InputError error(const urdf::Joint& joint, const std::string& expected, const std::string& found) const {
-    return at("joint", joint.name, expected, found);
-  }
-  InputError error(const urdf::Link& link, const std::string& expected, const std::string& found) const {
-    return at("link", link.name, expected, found);
-  }
-  InputError error(const std::string& field, const std::string& expected, const std::string& found) const {
-    return {path_, 0, field, expected, found};
-  }
-
-  /// The link that an option names.
-  LinkPtr link(const std::string& option, const std::string& name) const {
-    const LinkPtr found = model_->getLink(name);
-    if (found) return found;
-    std::vector<std::string> known;
-    for (const auto& entry : model_->links_) known.push_back(entry.first);
-    const std::string near = nearest(name, known);
-    throw error(option,
-                near.empty() ? fmt::format("one of the links {}", fmt::join(known, ", "))
-                             : fmt::format("a link of the file (did you mean '{}'?)", near),
-                "'" + name + "'");
-  }
-
- private:
-  InputError at(const std::string& what, const std::string& name, const std::string& expected,
-                const std::string& found) const {
-    const auto line = line_.find(what + " " + name);
-    return {path_, line == line_.end() ? 0 : line->second, fmt::format("{} '{}'", what, name), expected,
-            found};
-  }
-
-  std::string path_;
-  std::map<std::string, std::size_t> line_;
-  urdf::ModelInterfaceSharedPtr model_;
-};
-
 /// From the root down to this link.
-std::vector<LinkPtr> ancestry(LinkPtr link) {
-  std::vector<LinkPtr> way;
-  for (; link; link = link->getParent()) way.push_back(link);
+std::vector<const UrdfLinkNode*> ancestry(const UrdfLinkNode* link) {
+  std::vector<const UrdfLinkNode*> way;
+  for (;; link = link->parent_joint->parent) {
+    way.push_back(link);
+    if (link->parent_joint == nullptr) break;
+  }
   std::reverse(way.begin(), way.end());
   return way;
 }
 
-std::size_t turning_joints(const std::vector<LinkPtr>& way) {
-  return static_cast<std::size_t>(std::count_if(way.begin(), way.end(), [](const LinkPtr& link) {
-    return link->parent_joint && is_turning(*link->parent_joint);
+std::size_t turning_joints(const std::vector<const UrdfLinkNode*>& way) {
+  return static_cast<std::size_t>(std::count_if(way.begin(), way.end(), [](const UrdfLinkNode* link) {
+    return link->parent_joint != nullptr && link->parent_joint->is_turning();
   }));
 }
 
 /// Where links part: the number of links that both ways share.
-std::size_t shared(const std::vector<LinkPtr>& a, const std::vector<LinkPtr>& b) {
+std::size_t shared(const std::vector<const UrdfLinkNode*>& a, const std::vector<const UrdfLinkNode*>& b) {
   const auto [first, second] = std::mismatch(a.begin(), a.end(), b.begin(), b.end());
   return static_cast<std::size_t>(first - a.begin());
 }
 
-LinkPtr find_tip(const Tree& tree, const std::vector<LinkPtr>& to_base) {
-  std::vector<LinkPtr> tips;
+const UrdfLinkNode* find_tip(const UrdfTree& tree, const std::vector<const UrdfLinkNode*>& to_base) {
+  std::vector<const UrdfLinkNode*> tips;
   std::vector<std::string> ends;
-  for (const auto& entry : tree.model().links_) {
-    const LinkPtr link = entry.second;
-    if (!link->child_links.empty()) continue;
-    std::vector<LinkPtr> way = ancestry(link);
+  for (const auto& entry : tree.links()) {
+    const UrdfLinkNode* const link = &entry.second;
+    if (!link->children.empty()) continue;
+    std::vector<const UrdfLinkNode*> way = ancestry(link);
     way.erase(way.begin(), way.begin() + static_cast<std::ptrdiff_t>(shared(way, to_base)));
     const std::size_t turning = turning_joints(way);
     if (turning == joint_count) tips.push_back(link);
@@ -184,35 +56,33 @@ LinkPtr find_tip(const Tree& tree, const std::vector<LinkPtr>& to_base) {
   }
   if (tips.size() == 1) return tips.front();
   if (tips.empty()) {
-    throw tree.error("--tip",
-                     "a link that is six revolute or continuous joints away from " + to_base.back()->name,
-                     fmt::format("ends {}", fmt::join(ends, ", ")));
+    throw tree.option_error(
+        "--tip", "a link that is six revolute or continuous joints away from " + to_base.back()->name,
+        fmt::format("ends {}", fmt::join(ends, ", ")));
   }
   std::vector<std::string> names;
-  for (const LinkPtr& tip : tips) names.push_back(tip->name);
-  throw tree.error("--tip", "to be told which of several links to take",
-                   fmt::format("{}", fmt::join(names, ", ")));
+  for (const UrdfLinkNode* tip : tips) names.push_back(tip->name);
+  throw tree.option_error("--tip", "to be told which of several links to take",
+                          fmt::format("{}", fmt::join(names, ", ")));
 }
 
-void read_motion(const Tree& tree, const urdf::Joint& from, UrdfJoint& joint,
+void read_motion(const UrdfTree& tree, const UrdfJointNode& from, UrdfJoint& joint,
                  std::vector<std::string>& warnings) {
-  if (from.mimic) {
+  if (const XmlElement* const mimic = from.element->child("mimic")) {
     throw tree.error(from, "a joint that moves by itself",
-                     "one that mimics '" + from.mimic->joint_name + "'");
+                     "one that mimics " + text_of(mimic->attribute("joint")));
   }
-  const Eigen::Vector3d axis = vector(from.axis);
-  if (!(axis.norm() > 1e-6)) {
-    throw tree.error(from, "an axis with a direction", fmt::format("{} {} {}", axis.x(), axis.y(), axis.z()));
-  }
-  joint.axis = axis.normalized();
-  joint.max_speed_rad_s = from.limits && from.limits->velocity > 0 ? from.limits->velocity : 0;
-  const bool bounded = from.type == urdf::Joint::REVOLUTE && from.limits;
-  if (bounded && !(from.limits->lower < from.limits->upper)) {
-    throw tree.error(from, "a lower limit below the upper one",
-                     fmt::format("{} and {} rad", from.limits->lower, from.limits->upper));
-  }
-  if (bounded && from.limits->lower > -widest_rad && from.limits->upper < widest_rad) {
-    joint.limits = {from.limits->lower, from.limits->upper};
+  joint.axis = tree.axis(from);
+  joint.max_speed_rad_s = std::max(0.0, tree.limit(from, "velocity").value_or(0));
+  const bool bounded = from.type == "revolute";
+  if (bounded && from.element->child("limit") == nullptr)
+    throw tree.error(from, "a <limit>, as a URDF's revolute joints have", "none");
+  const double lower = tree.limit(from, "lower").value_or(0);
+  const double upper = tree.limit(from, "upper").value_or(0);
+  if (bounded && !(lower < upper))
+    throw tree.error(from, "a lower limit below the upper one", fmt::format("{} and {} rad", lower, upper));
+  if (bounded && lower > -widest_rad && upper < widest_rad) {
+    joint.limits = {lower, upper};
   } else {
     warnings.push_back(
         fmt::format("joint '{}' has no limits in the file; taken as +-360 degrees", from.name));
@@ -220,15 +90,15 @@ void read_motion(const Tree& tree, const urdf::Joint& from, UrdfJoint& joint,
 }
 
 /// The flange's place on the way to the tip.
-std::size_t find_flange(const Tree& tree, const std::vector<LinkPtr>& way, std::size_t last_joint,
-                        const std::string& name) {
+std::size_t find_flange(const UrdfTree& tree, const std::vector<const UrdfLinkNode*>& way,
+                        std::size_t last_joint, const std::string& name) {
   if (!name.empty()) {
-    const LinkPtr wanted = tree.link("--flange", name);
+    const UrdfLinkNode* const wanted = tree.link("--flange", name);
     const auto at = std::find(way.begin() + static_cast<std::ptrdiff_t>(last_joint), way.end(), wanted);
     if (at == way.end()) {
-      throw tree.error("--flange",
-                       fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
-                       "'" + name + "'");
+      throw tree.option_error("--flange",
+                              fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
+                              "'" + name + "'");
     }
     return static_cast<std::size_t>(at - way.begin());
   }
@@ -241,13 +111,13 @@ std::size_t find_flange(const Tree& tree, const std::vector<LinkPtr>& way, std::
 }  // namespace
 
 UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
-  const Tree tree(path);
+  const UrdfTree tree(path);
   UrdfArm arm;
-  arm.name = tree.model().getName();
-  const std::vector<LinkPtr> to_base =
-      ancestry(links.base.empty() ? LinkPtr(tree.model().getRoot()) : tree.link("--base", links.base));
-  const LinkPtr tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("--tip", links.tip);
-  const std::vector<LinkPtr> way = ancestry(tip);
+  arm.name = tree.name();
+  const std::vector<const UrdfLinkNode*> to_base =
+      ancestry(links.base.empty() ? tree.root() : tree.link("--base", links.base));
+  const UrdfLinkNode* const tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("--tip", links.tip);
+  const std::vector<const UrdfLinkNode*> way = ancestry(tip);
   const std::size_t fork = shared(way, to_base);
   arm.base = to_base.back()->name;
   arm.tip = tip->name;
@@ -255,17 +125,17 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   // Up from the base to where its way and the tip's part.
   Pose<double> root_to_base;
   for (std::size_t k = 1; k < to_base.size(); ++k) {
-    const urdf::Joint& joint = *to_base[k]->parent_joint;
-    if (joint.type != urdf::Joint::FIXED && k >= fork) {
+    const UrdfJointNode& joint = *to_base[k]->parent_joint;
+    if (!joint.is_fixed() && k >= fork) {
       throw tree.error(joint, "fixed joints alone between the base and the arm",
-                       std::string("a joint that is ") + kind(joint));
+                       "a joint that is " + joint.type);
     }
-    root_to_base = root_to_base * pose(joint.parent_to_joint_origin_transform);
+    root_to_base = root_to_base * tree.origin(joint);
   }
   arm.down = root_to_base.rotation.transpose() * -Eigen::Vector3d::UnitZ();
   Pose<double> fork_to_base;
   for (std::size_t k = fork; k < to_base.size(); ++k)
-    fork_to_base = fork_to_base * pose(to_base[k]->parent_joint->parent_to_joint_origin_transform);
+    fork_to_base = fork_to_base * tree.origin(*to_base[k]->parent_joint);
   Pose<double> frame = inverse(fork_to_base);
   arm.start = frame;
 
@@ -274,10 +144,11 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   std::vector<Pose<double>> after(way.size());
   std::size_t last = fork;
   for (std::size_t k = fork; k < way.size(); ++k) {
-    const urdf::Joint& joint = *way[k]->parent_joint;
-    frame = frame * pose(joint.parent_to_joint_origin_transform);
-    arm.steps.push_back({joint.name, is_turning(joint), pose(joint.parent_to_joint_origin_transform)});
-    if (is_turning(joint)) {
+    const UrdfJointNode& joint = *way[k]->parent_joint;
+    const Pose<double> origin = tree.origin(joint);
+    frame = frame * origin;
+    arm.steps.push_back({joint.name, joint.is_turning(), origin});
+    if (joint.is_turning()) {
       if (names.size() < joint_count) {
         UrdfJoint& out = arm.joints[names.size()];
         out.name = joint.name;
@@ -287,9 +158,8 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
       names.push_back(joint.name);
       frame = Pose<double>();
       last = k;
-    } else if (joint.type != urdf::Joint::FIXED) {
-      throw tree.error(joint, "a joint that is revolute, continuous or fixed",
-                       std::string("one that is ") + kind(joint));
+    } else if (!joint.is_fixed()) {
+      throw tree.error(joint, "a joint that is revolute, continuous or fixed", "one that is " + joint.type);
     }
     after[k] = frame;
   }

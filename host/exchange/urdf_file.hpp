@@ -56,8 +56,8 @@ struct UrdfLinks {
       flange;  ///< on the way to the tip; default: the link tool0 (REP 199), with any prefix, where there is one
 };
 
-/// By liburdfdom, whose own messages go into ours.
-/// \throws InputError  file absent; no XML (with line); no URDF; links that do not exist or are not connected as they
+/// Looks only at links, joints and what joints on the way to the tip are like.
+/// \throws InputError  file absent; as parse_xml(); no URDF; links that do not exist or are not connected as they
 ///                     should be; other than six revolute or continuous joints between them; a joint of another kind, one
 ///                     that mimics, or one without axis or range. The joint or link is the field.
 UrdfArm load_urdf(const std::string& path, const UrdfLinks& links);

@@ -19,19 +19,4 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-std::size_t tag_close(std::string_view text, std::size_t at) {
-  char quote = 0;
-  for (; at < text.size(); ++at) {
-    const char c = text[at];
-    if (quote != 0) {
-      if (c == quote) quote = 0;
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '>') {
-      return at;
-    }
-  }
-  return std::string_view::npos;
-}
-
 }  // namespace flexcomp::host

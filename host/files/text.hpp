@@ -4,26 +4,16 @@
 #ifndef FLEXCOMP_HOST_FILES_TEXT_HPP
 #define FLEXCOMP_HOST_FILES_TEXT_HPP
 
-#include <cstddef>
 #include <string>
 #include <string_view>
 
 namespace flexcomp::host {
-
-/// Bytes of a text, from `begin` to before `end`.
-struct TextSpan {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
 
 /// Without blanks and tabs at both ends.
 std::string_view trimmed(std::string_view text);
 
 /// ASCII letters in lower case; other bytes as they are.
 std::string lower(std::string_view text);
-
-/// Where the > of a tag of XML stands, looked for from `at` on and not within quotes; npos where there is none.
-std::size_t tag_close(std::string_view text, std::size_t at);
 
 }  // namespace flexcomp::host
 

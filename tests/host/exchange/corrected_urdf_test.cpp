@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "exchange/imported_arm.hpp"
-#include "exchange/urdf_text.hpp"
+#include "exchange/rotation_angles.hpp"
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"

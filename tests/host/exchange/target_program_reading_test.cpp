@@ -354,9 +354,9 @@ TEST(Val3, OnlyJointPositionsAreRewritten) {
   EXPECT_THAT(program.warnings[1], HasSubstr("p.dtx:7: "));
   EXPECT_THAT(program.warnings[2], HasSubstr("2 Cartesian points"));
   refuses(val3, "<Data type=\"jointRx\"><Value j1=\"1\" j2=\"2\"/></Data>", 1, "all of j1");
-  refuses(val3, "<Data type=\"jointRx\"><Value" + j + " j1=\"2\"/></Data>", 1, "once");
-  refuses(val3, "<Data type=\"jointRx\"><Value" + j + "/>\n<!-- ", 2, "no end");
-  refuses(val3, "<Data type=\"jointRx\"><Value" + j + "/>\n<Value j1=\"1>", 2, "ends with >");
+  refuses(val3, "<Data type=\"jointRx\"><Value" + j + " j1=\"2\"/></Data>", 1, "duplicate attribute");
+  refuses(val3, "<Data type=\"jointRx\"><Value" + j + "/>\n<!-- ", 2, "unclosed token");
+  refuses(val3, "<Data type=\"jointRx\"><Value" + j + "/>\n<Value j1=\"1>", 2, "unclosed token");
 }
 
 /// Seconds of this processor that reading takes, whatever else the machine does; refused or not.

@@ -2,6 +2,7 @@
 // Arms from URDF: the same motion as KDL's chain of the same drawing, lengths of the arm's size, refusals that say why.
 #include "exchange/urdf_file.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -470,7 +471,7 @@ TEST(RobotText, GivesEveryRobotOfTheProjectBack) {
 
 const std::string kuka = support::read(data + "kuka_kr6_r900.urdf");
 
-/// Refused with this field and parts; nothing of liburdfdom's own on standard error.
+/// Refused with this field and parts; nothing is printed.
 void refused(const std::string& text, const std::string& field, const std::vector<std::string>& parts,
              const UrdfLinks& links = {}) {
   testing::internal::CaptureStderr();
@@ -498,10 +499,28 @@ TEST(UrdfRefusals, FilesThatAreNone) {
   refused("<robot name=\"x\" xmlns:xacro=\"u\">\n<xacro:arm prefix=\"\"/></robot>", "",
           {":2", "xacro FILE >", "<xacro:arm>"});
   refused(replaced(kuka, " name=\"kuka-kr6-r900-sixx\"", ""), "", {"URDF", "name"});
-  refused(replaced(kuka, "0.455 0 0", "0.455 0"), "", {"URDF"});
-  refused(replaced(kuka, "0.455 0 0", "0.455 nan 0"), "", {"URDF"});
-  refused(replaced(kuka, "<child link=\"link_3\"/>", "<child link=\"link_9\"/>"), "", {"URDF", "link_9"});
-  refused(replaced(kuka, "<child link=\"link_3\"/>", "<child link=\"link_1\"/>"), "", {"URDF"});
+  for (const char* numbers :
+       {"0.455 0", "0.455 nan 0", "0.455 0 0 0", "0.455 0 0 x", "0.455 0 1e999", "", "a"}) {
+    refused(replaced(kuka, "0.455 0 0", numbers), "joint 'joint_a3'",
+            {"bad.urdf:32: ", "URDF", "xyz", fmt::format("'{}'", numbers)});
+  }
+  refused(replaced(kuka, "<child link=\"link_3\"/>", "<child link=\"link_9\"/>"), "joint 'joint_a3'",
+          {"bad.urdf:29: ", "URDF", "child", "'link_9'"});
+  refused(replaced(kuka, "<child link=\"link_3\"/>", ""), "joint 'joint_a3'", {"URDF", "child", "nothing"});
+  refused(replaced(kuka, "<child link=\"link_3\"/>", "<child link=\"link_1\"/>"), "joint 'joint_a3'",
+          {"URDF", "one joint", "'link_1' on 'joint_a1'"});
+  refused(replaced(kuka, "<link name=\"tool0\"/>", "<link name=\"tool0\"/><link name=\"tool0\"/>"), "",
+          {"URDF", "each link once", "tool0"});
+  refused(replaced(kuka, "<link name=\"tool0\"/>", "<link name=\"tool0\"/><link/>"), "",
+          {"<link> has a name"});
+  refused(replaced(kuka, "</robot>", "<link name=\"alone\"/></robot>"), "link 'base_link'",
+          {"one root", "'alone' as well"});
+  const std::string ring =
+      "<link name=\"r1\"/><link name=\"r2\"/><link name=\"r3\"/>"
+      "<joint name=\"j1\" type=\"fixed\"><parent link=\"r1\"/><child link=\"r2\"/></joint>"
+      "<joint name=\"j2\" type=\"fixed\"><parent link=\"r2\"/><child link=\"r1\"/></joint>"
+      "<joint name=\"j3\" type=\"fixed\"><parent link=\"r1\"/><child link=\"r3\"/></joint></robot>";
+  refused(replaced(kuka, "</robot>", ring), "link 'r1'", {"tree", "ring"});
 }
 
 TEST(UrdfRefusals, JointsThatAreNotSixTurningOnes) {
@@ -515,7 +534,11 @@ TEST(UrdfRefusals, JointsThatAreNotSixTurningOnes) {
   refused(
       replaced(kuka, "name=\"joint_a6-tool0\" type=\"fixed\"", "name=\"joint_a6-tool0\" type=\"continuous\""),
       "link 'tool0'", {"exactly six", "7: "}, {"", "tool0", ""});
-  refused(replaced(kuka, a3, "name=\"joint_a3\" type=\"twisting\""), "", {"URDF", "joint_a3"});
+  refused(replaced(kuka, a3, "name=\"joint_a3\" type=\"twisting\""), "joint 'joint_a3'",
+          {"bad.urdf:29: ", "URDF", "'twisting'"});
+  refused(
+      replaced(kuka, "<limit effort=\"0\" lower=\"-2.0943951023931953\" upper=\"2.7", "<range upper=\"2.7"),
+      "joint 'joint_a3'", {"<limit>", "none"});
   refused(replaced(kuka, "<axis xyz=\"-1 0 0\"/>", "<axis xyz=\"0 0 0\"/>"), "joint 'joint_a4'",
           {"a direction", "0 0 0"});
   refused(replaced(kuka, "<axis xyz=\"-1 0 0\"/>", "<axis xyz=\"-1 0 0\"/><mimic joint=\"joint_a1\"/>"),
