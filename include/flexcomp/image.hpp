@@ -246,8 +246,7 @@ inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, con
       // By what it does, not only by its name: a clock of the controller's is not the tracker's, and what follows it
       // would move the arm with nothing in the control cycle to bound the change.
       if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
-          t.basis == Basis::relative_speed || t.effect == Effect::base_drift ||
-          t.effect == Effect::readout_lag || t.effect == Effect::reflector_slip) {
+          t.basis == Basis::relative_speed || belongs_to_measurement(t.effect)) {
         return Refusal::bad_place;
       }
       return model.add(t);

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "flexcomp/effect.hpp"
+
 namespace flexcomp {
 
 /// The part of the arm that a place belongs to. The numbers are on the wire: add, never change.
@@ -56,7 +58,8 @@ enum class Basis : std::uint8_t {
   one = 0,                ///< 1: a geometric error
   load_torque = 1,        ///< tau_joint, N·m: torque of payload and external force about the joint's axis
   load_torque_cubed = 2,  ///< tau_joint^3
-  link_weight = 3,     ///< lever s of the link of `joint` (docs/model.md, M13); `argument` = joint of the far point
+  link_weight =
+      3,  ///< lever s of the link of `joint` (docs/model.md, M13); `argument` = joint of the far point
   joint_position = 4,  ///< q_joint, rad
   sine = 5,            ///< sin(argument * q_joint)
   cosine = 6,          ///< cos(argument * q_joint)
@@ -90,29 +93,6 @@ enum class Covariate : std::uint8_t {
   time = 3,            ///< s
   direction = 4,       ///< direction_joint
   relative_speed = 5,  ///< u_joint
-};
-
-/// The effect of the catalogue that a term belongs to (docs/effects.md), so that a set can be read back into
-/// names. Registered here, on the wire, never reused.
-enum class Effect : std::uint8_t {
-  geometric = 0,
-  joint_compliance = 1,
-  link_gravity = 2,
-  nonlinear_compliance = 3,
-  gear_harmonic = 4,
-  joint_curve = 5,
-  backlash = 6,
-  readout_lag = 7,
-  encoder_scale = 8,
-  joint_coupling = 9,
-  axis_wobble = 10,
-  link_bending = 11,
-  thermal_growth = 12,
-  base_drift = 13,
-  base_compliance = 14,
-  payload_error = 15,
-  reflector_slip = 16,
-  unnamed = 17,
 };
 
 constexpr std::uint16_t no_table = 0xFFFF;
