@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "measurement/measured_data.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 
 namespace flexcomp::host {
 

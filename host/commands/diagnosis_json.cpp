@@ -6,6 +6,8 @@
 #include <string>
 
 #include "diagnosis/messages.hpp"
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -22,25 +24,43 @@ Json or_null(const std::optional<double>& v) { return v ? Json(*v) : Json(); }
 /// The keys that say which effect it is, as in calibration files; whole numbers without a point.
 Json id_json(const EffectId& id) {
   Json j{{"effect", effect_name(id.effect)}};
-  if (id.joint != 0) j["joint"] = id.joint;
-  if (id.from != 0) j["from"] = id.from;
-  if (id.link != 0) j["link"] = id.link;
-  if (id.order != 0) {
-    if (id.order == std::floor(id.order)) {
-      j["order"] = static_cast<long>(id.order);
-    } else {
-      j["order"] = id.order;
+  for (const Selector s : descriptor(id.effect).selectors) {
+    switch (s) {
+      case Selector::joint:
+        j["joint"] = id.joint;
+        break;
+      case Selector::from:
+        j["from"] = id.from;
+        break;
+      case Selector::link:
+        if (id.link != 0) j["link"] = id.link;
+        break;
+      case Selector::order:
+        if (id.order == std::floor(id.order)) {
+          j["order"] = static_cast<long>(id.order);
+        } else {
+          j["order"] = id.order;
+        }
+        break;
+      case Selector::pivot:
+        j["pivot_z_mm"] = id.pivot_z_m * 1e3;
+        break;
+      case Selector::after:
+        j["after_s"] = id.after_s;
+        break;
+      case Selector::factor:
+        if (id.factor != Factor::one) j["factor"] = factor_name(id.factor);
+        break;
+      case Selector::place:
+        j["place"] = place_name(id.place);
+        break;
+      case Selector::grid:
+        j["of"] = {covariate_name(id.covariate[0], id.covariate_joint[0]),
+                   covariate_name(id.covariate[1], id.covariate_joint[1])};
+        break;
+      case Selector::size:
+        break;
     }
-  }
-  if (id.effect == Effect::base_compliance) j["pivot_z_mm"] = id.pivot_z_m * 1e3;
-  if (id.effect == Effect::reflector_slip) j["after_s"] = id.after_s;
-  if (id.effect == Effect::joint_curve && id.factor == Factor::load_torque) j["factor"] = "load_torque";
-  if (id.effect == Effect::joint_curve && id.factor == Factor::temperature) j["factor"] = "temperature";
-  if (id.effect == Effect::joint_curve && id.factor == Factor::payload) j["factor"] = "payload";
-  if (id.effect == Effect::unnamed) {
-    j["place"] = place_name(id.place);
-    j["of"] = {covariate_name(id.covariate[0], id.covariate_joint[0]),
-               covariate_name(id.covariate[1], id.covariate_joint[1])};
   }
   return j;
 }

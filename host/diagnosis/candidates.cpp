@@ -2,8 +2,11 @@
 #include "diagnosis/candidates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <utility>
 
 namespace flexcomp::host {
 
@@ -30,67 +33,40 @@ std::vector<std::size_t> curve_sizes(std::size_t poses) {
   return sizes;
 }
 
-class Builder {
- public:
-  Builder(const Robot& robot, const TermSet& set) : robot_(robot) {
-    out_.set = set;
-    model_.set = set;
-    for (EffectGroup& group : effects_of(set, robot.nominal)) present_.push_back(std::move(group.id));
+/// Standard deviations of the coefficients of fine curves, rad: a prior lets them follow structure that is finer than
+/// the data would bear without one.
+constexpr std::size_t finest_free_curve = 24;
+constexpr std::array<double, 3> smooth_sizes_rad{5e-5, 1.5e-4, 5e-4};
+
+/// Columns that the rows lack for an effect, or that never vary.
+std::vector<std::string> lacking(const EffectDescriptor& d, const Testable& can,
+                                 const ContextColumns& columns) {
+  std::vector<std::string> needs;
+  switch (d.needs) {
+    case Needs::poses:
+      break;
+    case Needs::load:
+      if (!can.payload) needs = {"payload_kg"};
+      break;
+    case Needs::direction:
+      for (unsigned j = 1; j <= joint_count; ++j) {
+        if (!can.direction[j - 1]) needs.push_back("dir" + std::to_string(j));
+      }
+      break;
+    case Needs::moves:
+      for (unsigned j = 1; j <= joint_count && !can.relative_speed; ++j) {
+        if (!columns.move[j - 1]) needs.push_back("move" + std::to_string(j) + "_deg");
+      }
+      break;
+    case Needs::temperature:
+      if (!can.temperature) needs = {"temp_c"};
+      break;
+    case Needs::time:
+      if (!can.time) needs = {"time_s"};
+      break;
   }
-
-  /// Adds all parameters of an effect in the given forms (indices of its parameters; none: one form of all).
-  void add(const EffectId& id, bool positive = false,
-           const std::vector<std::vector<std::size_t>>& forms = {}) {
-    if (validation_error(id, robot_.nominal)) return;
-    for (const EffectId& other : present_) {
-      if (same_name(other, id)) return;
-    }
-    const std::size_t first = model_.parameters.size();
-    add_effect(model_, id, robot_.nominal);
-    const std::size_t count = model_.parameters.size() - first;
-    std::vector<std::vector<std::size_t>> used = forms;
-    if (used.empty()) {
-      used.emplace_back();
-      for (std::size_t k = 0; k < count; ++k) used.back().push_back(k);
-    }
-    for (const std::vector<std::size_t>& form : used) {
-      Candidate c;
-      c.id = id;
-      c.positive = positive;
-      c.first = first;
-      for (const std::size_t k : form) c.parameters.push_back(first + k);
-      out_.list.push_back(std::move(c));
-    }
-  }
-
-  /// The effect that was added last once more, its coefficients being of these sizes.
-  void smooth_forms(const std::vector<double>& sizes_rad) {
-    if (out_.list.empty() || out_.list.back().id.effect != Effect::joint_curve) return;
-    const Candidate free = out_.list.back();
-    for (const double size : sizes_rad) {
-      out_.list.push_back(free);
-      out_.list.back().prior_rad = size;
-    }
-  }
-
-  void lacks(Effect effect, std::vector<std::string> needs) {
-    out_.not_testable.push_back({effect, std::move(needs)});
-  }
-
-  CandidateSet finish() {
-    out_.set = std::move(model_.set);
-    out_.parameters = std::move(model_.parameters);
-    return std::move(out_);
-  }
-
-  CandidateSet& out() { return out_; }
-
- private:
-  const Robot& robot_;
-  CandidateSet out_;
-  ParametricModel model_;
-  std::vector<EffectId> present_;
-};
+  return needs;
+}
 
 /// The lowest body that stands on the floor: where a pedestal gives way.
 double pivot_of(const Robot& robot) {
@@ -101,12 +77,63 @@ double pivot_of(const Robot& robot) {
   return lowest;
 }
 
-}  // namespace
-
-bool same_name(const EffectId& a, const EffectId& b) {
-  return a.effect == b.effect && a.joint == b.joint && a.from == b.from && a.link == b.link &&
-         a.order == b.order && (a.effect != Effect::unnamed || a.place == b.place);
+/// Every id of an effect on this arm; those that its rule refuses among them.
+std::vector<EffectId> ids_of(const EffectDescriptor& d, const Robot& robot, std::size_t poses) {
+  std::vector<EffectId> ids{{.effect = d.effect}};
+  const auto each = [&ids](const auto& expand) {
+    std::vector<EffectId> all;
+    for (const EffectId& id : ids) expand(id, all);
+    ids = std::move(all);
+  };
+  const auto numbers = [&each](unsigned EffectId::*member, unsigned first) {
+    each([&](EffectId id, std::vector<EffectId>& all) {
+      for (id.*member = first; id.*member <= joint_count; ++(id.*member)) all.push_back(id);
+    });
+  };
+  for (const Selector s : d.selectors) {
+    switch (s) {
+      case Selector::joint:
+        numbers(&EffectId::joint, 1);
+        break;
+      case Selector::from:
+        numbers(&EffectId::from, 1);
+        break;
+      case Selector::link:
+        numbers(&EffectId::link, d.all_links_by_default ? 0 : 1);
+        break;
+      case Selector::order:
+        each([&](EffectId id, std::vector<EffectId>& all) {
+          for (const double order : d.orders(robot, id.joint)) {
+            id.order = order;
+            all.push_back(id);
+          }
+        });
+        break;
+      case Selector::size:
+        each([&](EffectId id, std::vector<EffectId>& all) {
+          for (const std::size_t size : curve_sizes(poses)) {
+            id.coefficients = size;
+            all.push_back(id);
+          }
+        });
+        break;
+      case Selector::pivot:
+        ids.front().pivot_z_m = pivot_of(robot);
+        break;
+      case Selector::after:
+        ids.front().after_s = everything_after_s;
+        break;
+      case Selector::factor:
+        break;
+      case Selector::place:
+      case Selector::grid:
+        return {};  // smooth functions stand in for them
+    }
+  }
+  return ids;
 }
+
+}  // namespace
 
 Testable testable(const std::vector<Observation>& rows, const ContextColumns& columns) {
   Testable t;
@@ -133,94 +160,45 @@ Testable testable(const std::vector<Observation>& rows, const ContextColumns& co
 CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows,
                         const ContextColumns& columns, const TermSet& set) {
   const Testable can = testable(rows, columns);
-  Builder b(robot, set);
-  EffectId id;
-  const auto each_joint = [&](Effect effect, bool positive) {
-    id = EffectId{.effect = effect};
-    for (id.joint = 1; id.joint <= joint_count; ++id.joint) b.add(id, positive);
-  };
-  if (can.payload) {
-    each_joint(Effect::joint_compliance, true);
-    each_joint(Effect::nonlinear_compliance, false);
-    id = EffectId{.effect = Effect::link_bending};
-    for (id.link = 1; id.link <= joint_count; ++id.link) b.add(id);
-    b.add(EffectId{.effect = Effect::base_compliance, .pivot_z_m = pivot_of(robot)});
-    b.add(EffectId{.effect = Effect::payload_error}, false, {{0}, {1, 2, 3}, {0, 1, 2, 3}});
-  } else {
-    for (const Effect e : {Effect::joint_compliance, Effect::nonlinear_compliance, Effect::link_bending,
-                           Effect::base_compliance, Effect::payload_error})
-      b.lacks(e, {"payload_kg"});
-  }
-  b.add(EffectId{.effect = Effect::link_gravity});
-  id = EffectId{.effect = Effect::gear_harmonic};
-  for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    for (unsigned order = 1; order <= 8; ++order) {
-      id.order = order;
-      b.add(id);
-    }
-    const double ratio = robot.gear_ratio[id.joint - 1];
-    for (const double order : {ratio, 2 * ratio}) {
-      id.order = order;
-      if (order > 8) b.add(id);
-    }
-  }
-  each_joint(Effect::encoder_scale, false);
-  id = EffectId{.effect = Effect::joint_coupling};
-  for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    for (id.from = 1; id.from <= joint_count; ++id.from) b.add(id);
-  }
-  id = EffectId{.effect = Effect::axis_wobble};
-  for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    for (const double order : {1.0, 2.0}) {
-      id.order = order;
-      b.add(id);
+  CandidateSet out;
+  ParametricModel model;
+  model.set = set;
+  const std::vector<EffectGroup> present = effects_of(set, robot.nominal);
+  for (const EffectDescriptor& d : all_effects()) {
+    const std::vector<std::string> needs = lacking(d, can, columns);
+    if (!needs.empty()) out.not_testable.push_back({d.effect, needs});
+    for (const EffectId& id : ids_of(d, robot, rows.size())) {
+      const bool is_testable = d.needs == Needs::direction ? can.direction[id.joint - 1] : needs.empty();
+      if (!is_testable || validation_error(id, robot.nominal) ||
+          std::any_of(present.begin(), present.end(),
+                      [&](const EffectGroup& group) { return same_name(group.id, id); }))
+        continue;
+      Candidate c;
+      c.id = id;
+      c.positive = d.is_nonnegative;
+      c.first = model.parameters.size();
+      c.steps = d.has(Selector::after);
+      add_effect(model, id, robot.nominal);
+      std::vector<std::vector<std::size_t>> forms = d.forms;
+      if (forms.empty()) {
+        forms.emplace_back(model.parameters.size() - c.first);
+        std::iota(forms.back().begin(), forms.back().end(), std::size_t{0});
+      }
+      for (const std::vector<std::size_t>& form : forms) {
+        c.parameters.clear();
+        for (const std::size_t k : form) c.parameters.push_back(c.first + k);
+        out.list.push_back(c);
+      }
+      if (id.coefficients < finest_free_curve) continue;
+      for (const double size : smooth_sizes_rad) {
+        c.prior_rad = size;
+        out.list.push_back(c);
+      }
     }
   }
-  id = EffectId{.effect = Effect::joint_curve};
-  for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    for (const std::size_t size : curve_sizes(rows.size())) {
-      id.coefficients = size;
-      b.add(id);
-      // Forms with a prior follow structure that is finer than the data would bear without one.
-      if (size >= 24) b.smooth_forms({5e-5, 1.5e-4, 5e-4});
-    }
-  }
-  std::vector<std::string> no_direction;
-  id = EffectId{.effect = Effect::backlash};
-  for (id.joint = 1; id.joint <= joint_count; ++id.joint) {
-    if (can.direction[id.joint - 1]) {
-      b.add(id, true);
-    } else {
-      no_direction.push_back("dir" + std::to_string(id.joint));
-    }
-  }
-  if (!no_direction.empty()) b.lacks(Effect::backlash, no_direction);
-  if (can.relative_speed) {
-    each_joint(Effect::readout_lag, true);
-  } else {
-    std::vector<std::string> needs;
-    for (unsigned j = 1; j <= joint_count; ++j) {
-      if (!columns.move[j - 1]) needs.push_back("move" + std::to_string(j) + "_deg");
-    }
-    b.lacks(Effect::readout_lag, needs);
-  }
-  if (can.temperature) {
-    id = EffectId{.effect = Effect::thermal_growth};
-    for (id.link = 0; id.link <= joint_count; ++id.link) b.add(id);
-  } else {
-    b.lacks(Effect::thermal_growth, {"temp_c"});
-  }
-  if (can.time) {
-    b.add(EffectId{.effect = Effect::base_drift}, false, {{0, 1, 2}, {3, 4, 5}, {0, 1, 2, 3, 4, 5}});
-    b.out().has_slip = true;
-    // Last, so that its columns are the last three.
-    b.add(EffectId{.effect = Effect::reflector_slip, .after_s = everything_after_s});
-    b.out().list.back().steps = true;
-  } else {
-    b.lacks(Effect::base_drift, {"time_s"});
-    b.lacks(Effect::reflector_slip, {"time_s"});
-  }
-  return b.finish();
+  out.set = std::move(model.set);
+  out.parameters = std::move(model.parameters);
+  return out;
 }
 
 }  // namespace flexcomp::host

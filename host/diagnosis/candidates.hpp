@@ -23,7 +23,7 @@ struct Candidate {
   std::size_t first = 0;                ///< of these, the first one of the whole effect
   double prior_rad = 0;                 ///< of a smooth curve: standard deviation of a coefficient; 0: free
   bool positive = false;                ///< physics allows no negative coefficient
-  /// reflector_slip: the columns count from here on only
+  /// The columns are those of a step at some time: here, before all rows. A scan finds the time.
   bool steps = false;
 };
 
@@ -33,8 +33,6 @@ struct CandidateSet {
   std::vector<Parameter> parameters;  ///< of the effects only
   std::vector<Candidate> list;
   std::vector<NotTestable> not_testable;
-  bool has_slip =
-      false;  ///< the last three parameters move the measured point, from after_s on (before all rows here)
 };
 
 /// What the context of the rows lets us ask for.
@@ -50,9 +48,6 @@ Testable testable(const std::vector<Observation>& rows, const ContextColumns& co
 /// All of them but those that `set` has already.
 CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows,
                         const ContextColumns& columns, const TermSet& set);
-
-/// Two forms of one name: the same effect at the same place, whatever its size or number of coefficients.
-bool same_name(const EffectId& a, const EffectId& b);
 
 }  // namespace flexcomp::host
 

@@ -21,6 +21,7 @@
 #include "identification/fitted_calibration.hpp"
 #include "identification/identify.hpp"
 #include "linalg/blas.hpp"
+#include "model/place.hpp"
 
 namespace flexcomp::host {
 
@@ -116,7 +117,7 @@ std::vector<PlaceShare> places_left_at(const Refit& refit, const Robot& robot,
   for (const double w : refit.fit.weight) counts.push_back(w >= 1);
   const Estimate& at = refit.fit.estimate;
   const GapSystem system =
-      gap_system(robot, rows, counts, at, refit.fitted, CandidateSet{at.set, {}, {}, {}, false});
+      gap_system(robot, rows, counts, at, refit.fitted, CandidateSet{at.set, {}, {}, {}});
   return place_shares(system, remainder(system));
 }
 
@@ -192,7 +193,8 @@ bool prefer_scatter(Answer& answer, const Robot& robot, const std::vector<Observ
         place_name(s.place), in_words(s)));
   }
   for (const NotTestable& n : other.explainer->not_testable()) {
-    if ((n.effect != Effect::backlash && n.effect != Effect::readout_lag) || n.needs.empty()) continue;
+    const Needs needs = descriptor(n.effect).needs;
+    if ((needs != Needs::direction && needs != Needs::moves) || n.needs.empty()) continue;
     if (most.place.slot == slot::theta)
       other.found.notes.push_back(fmt::format("{} would look like this; to test it record {}",
                                               effect_name(n.effect), fmt::join(n.needs, ", ")));
@@ -343,7 +345,7 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
     effect.p_value = chance.p_value(effect.delta_bic);
     const double cv = left_out.chi2_per_number(search, less);
     effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
-    effect.pushed = !is_measurement_effect(effect.id.effect);
+    effect.pushed = !belongs_to_measurement(effect.id.effect);
     effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
     describe(effect, refit, robot, *answer.rows, system.nuisance);
     out.effects.push_back(std::move(effect));

@@ -17,50 +17,57 @@ namespace {
 
 constexpr std::size_t line_points = 181;
 
-/// What the effect follows.
-struct Follows {
+/// What an effect is drawn over.
+struct Abscissa {
+  enum class Kind { reading, direction, speed, torque };
   std::string name;
-  bool cases = false;
-  bool reading = false;  ///< of `joint` (from 0): the line is drawn over all angles, not only where rows are
-  std::size_t joint = 0;
-  bool torque = false;
+  Kind kind = Kind::reading;  ///< over a reading the line covers all angles, not only where rows are
+  std::size_t joint = 0;      ///< from 0
 };
 
-std::optional<Follows> follows(const EffectId& id) {
-  const auto angle = [](unsigned joint) {
-    return Follows{fmt::format("q{} [deg]", joint), false, true, joint - 1U, false};
-  };
-  switch (id.effect) {
-    case Effect::joint_curve:
-      if (id.factor != Factor::one) return std::nullopt;  // a function of two things
-      return angle(id.joint);
-    case Effect::gear_harmonic:
-    case Effect::encoder_scale:
-      return angle(id.joint);
-    case Effect::joint_coupling:
-      return angle(id.from);
-    case Effect::backlash:
-      return Follows{fmt::format("direction of joint {} before the pose", id.joint), true, false,
-                     id.joint - 1U, false};
-    case Effect::readout_lag:
-      return Follows{fmt::format("relative speed of joint {}", id.joint), false, false, id.joint - 1U, false};
-    case Effect::joint_compliance:
-    case Effect::nonlinear_compliance:
-      return Follows{fmt::format("load torque on joint {} [N m]", id.joint), false, false, id.joint - 1U,
-                     true};
-    default:
-      return std::nullopt;
+/// The quantity on the x axis: of an effect whose terms all turn its joint and read one quantity of one joint.
+std::optional<Abscissa> abscissa(const EffectId& id, const Nominal& robot) {
+  std::optional<Abscissa> out;
+  for (const EffectKey& key : keys(id, robot)) {
+    for (const Term<double>& term : key.terms) {
+      if (term.place != Place{static_cast<std::uint8_t>(id.joint), slot::theta}) return std::nullopt;
+      const unsigned joint = term.joint + 1U;
+      switch (term.basis) {
+        case Basis::curve:
+          if (term.factor != Factor::one) return std::nullopt;  // a function of two things
+          [[fallthrough]];
+        case Basis::joint_position:
+        case Basis::sine:
+        case Basis::cosine:
+          out = {fmt::format("q{} [deg]", joint), Abscissa::Kind::reading, term.joint};
+          break;
+        case Basis::direction:
+          out = {fmt::format("direction of joint {} before the pose", joint), Abscissa::Kind::direction,
+                 term.joint};
+          break;
+        case Basis::relative_speed:
+          out = {fmt::format("relative speed of joint {}", joint), Abscissa::Kind::speed, term.joint};
+          break;
+        case Basis::load_torque:
+        case Basis::load_torque_cubed:
+          out = {fmt::format("load torque on joint {} [N m]", joint), Abscissa::Kind::torque, term.joint};
+          break;
+        default:
+          return std::nullopt;
+      }
+    }
   }
+  return out;
 }
 
-double x_of(const Follows& f, const EffectId& id, const HostModel& model, const Observation& row) {
-  if (f.reading) return degrees(row.q_rad[f.joint]);
-  if (id.effect == Effect::backlash) return row.context.direction[f.joint];
-  if (id.effect == Effect::readout_lag) return row.context.relative_speed[f.joint];
+double x_of(const Abscissa& a, const HostModel& model, const Observation& row) {
+  if (a.kind == Abscissa::Kind::reading) return degrees(row.q_rad[a.joint]);
+  if (a.kind == Abscissa::Kind::direction) return row.context.direction[a.joint];
+  if (a.kind == Abscissa::Kind::speed) return row.context.relative_speed[a.joint];
   Linearisation<double, joint_count> at;
   linearise(model, row.q_rad, row.context, at);
-  return detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(f.joint, 2),
-                                      at.unloaded.frames.origin[f.joint]);
+  return detail::moment_about<double>(at.unloaded.load, at.unloaded.frames.axis(a.joint, 2),
+                                      at.unloaded.frames.origin[a.joint]);
 }
 
 /// A turn of the joint that follows nothing: cos(0 q). No constant of the chain, or loads would be taken elsewhere.
@@ -88,7 +95,7 @@ double along(const Eigen::VectorXd& column, const Eigen::VectorXd& turn, Eigen::
 
 std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& calibration,
                                         const EffectId& id, const std::vector<Observation>& rows) {
-  const auto what = follows(id);
+  const auto what = abscissa(id, robot.nominal);
   if (!what || rows.empty()) return std::nullopt;
   const auto groups = effects_of(calibration.terms, robot.nominal);
   const auto group = std::find_if(groups.begin(), groups.end(),
@@ -110,13 +117,13 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
 
   EffectProfile out;
   out.x_name = what->name;
-  out.cases = what->cases;
+  out.cases = what->kind == Abscissa::Kind::direction;
   const Linearised now = linearised(with, *model, rows, unknowns);
   const Linearised then = linearised(without, *bare, rows, {{}, {unknowns.parameters.front()}, {}});
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     ProfileRow r;
-    r.x = x_of(*what, id, *model, rows[k]);
+    r.x = x_of(*what, *model, rows[k]);
     r.without_rad = along(then.residual, then.derivative.col(0), i) * units[0];
     r.left_rad = along(now.residual, now.derivative.col(0), i) * units[0];
     const double stiffness = now.derivative.col(0).segment<6>(6 * i).norm();
@@ -127,7 +134,7 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
 
   // The line: over all angles that were measured, or where the rows are.
   std::vector<Observation> places = rows;
-  if (what->reading) {
+  if (what->kind == Abscissa::Kind::reading) {
     const auto [low, high] = std::minmax_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) {
       return a.q_rad[what->joint] < b.q_rad[what->joint];
     });
@@ -136,7 +143,7 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
     for (std::size_t k = 0; k < line_points; ++k) {
       places[k].q_rad[what->joint] = from + (to - from) * static_cast<double>(k) / (line_points - 1);
     }
-  } else if (what->cases) {
+  } else if (out.cases) {
     places.assign(2, rows.front());
     places[0].context.direction[what->joint] = -1;
     places[1].context.direction[what->joint] = 1;
@@ -160,7 +167,7 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
   for (Eigen::Index k = 0; k < count; ++k) {
     const Observation& row = places[static_cast<std::size_t>(k)];
     ProfilePoint point;
-    point.x = x_of(*what, id, *model, row);
+    point.x = x_of(*what, *model, row);
     for (Eigen::Index p = 0; p < slopes.cols(); ++p) {
       slopes(k, p) = along(drawn.derivative.col(p + 1), drawn.derivative.col(0), k) * units[0] / units[p + 1];
       point.value_rad += slopes(k, p) * group->parameters[static_cast<std::size_t>(p)].get(with.set);

@@ -10,6 +10,8 @@
 
 #include "diagnosis/refit.hpp"
 #include "measurement/repeats.hpp"
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 
 namespace flexcomp::host {
 
@@ -24,6 +26,7 @@ constexpr std::size_t finest_local = 96;
 constexpr double deep_fault_rad = 5e-4;
 
 bool is_function(const Block& b) { return b.id.effect == Effect::unnamed; }
+bool is_step(const EffectId& id) { return descriptor(id.effect).has(Selector::after); }
 
 Block local_block(const LocalCurve& c, std::size_t index) {
   Block block;
@@ -149,11 +152,10 @@ Scored with_relevant_members(GapSystem& system, SubsetSearch& search, Scanned& s
 }
 
 void add_slips(GapSystem& system, const std::vector<Slip>& found, const std::vector<Observation>& rows,
-               const std::array<Eigen::VectorXd, 3>& point, std::size_t candidate,
-               const std::vector<std::size_t>& parameters) {
+               const std::array<Eigen::VectorXd, 3>& point, std::size_t index, const Candidate& candidate) {
   for (const Slip& slip : found) {
     const bool there = std::any_of(system.blocks.begin(), system.blocks.end(), [&](const Block& b) {
-      return b.id.effect == Effect::reflector_slip && b.id.after_s == slip.after_s;
+      return is_step(b.id) && b.id.after_s == slip.after_s;
     });
     if (there) continue;
     Eigen::VectorXd step(static_cast<Eigen::Index>(rows.size()));
@@ -162,11 +164,12 @@ void add_slips(GapSystem& system, const std::vector<Slip>& found, const std::vec
     Eigen::MatrixXd columns(point[0].size(), 3);
     for (int c = 0; c < 3; ++c) columns.col(c) = times(point[static_cast<std::size_t>(c)], step);
     Block block;
-    block.id = EffectId{.effect = Effect::reflector_slip, .after_s = slip.after_s};
-    block.candidate = candidate;
+    block.id = candidate.id;
+    block.id.after_s = slip.after_s;
+    block.candidate = index;
     block.parameters = 4;
     block.margin = margin;
-    block.fitted = parameters;
+    block.fitted = candidate.parameters;
     add_block(system, block, columns);
   }
 }
@@ -221,7 +224,7 @@ Estimate EffectSearch::extended(const Estimate& nuisance, const Explanation* fou
   for (std::size_t v = 0; v < start_.set.values.size(); ++v) out.set.values[v] = nuisance.set.values[v];
   if (found == nullptr) return out;
   for (const Hypothesis& piece : found->pieces) {
-    if (piece.id.effect == Effect::reflector_slip) continue;  // its step is not the candidates' own
+    if (is_step(piece.id)) continue;  // its step is not the candidates' own
     for (std::size_t k = 0; k < piece.parameters.size(); ++k)
       candidates_.parameters[piece.parameters[k]].set(out.set, piece.value[static_cast<Eigen::Index>(k)]);
   }
@@ -244,13 +247,12 @@ Explanation EffectSearch::search(const Estimate& at, const std::vector<bool>& co
   out.system = std::make_shared<GapSystem>(gap_system(robot_, rows_, counts, at, fitted_, candidates_));
   GapSystem& system = *out.system;
   std::array<Eigen::VectorXd, 3> point;
-  std::size_t slip_candidate = candidates_.list.size();
-  std::vector<std::size_t> slip_parameters;
-  if (candidates_.has_slip) {
-    slip_candidate = candidates_.list.size() - 1;
-    slip_parameters = candidates_.list.back().parameters;
+  const auto slip = std::find_if(candidates_.list.begin(), candidates_.list.end(),
+                                 [](const Candidate& c) { return c.steps; });
+  const bool has_slip = slip != candidates_.list.end();
+  if (has_slip) {
     Unknowns three;
-    for (const std::size_t p : slip_parameters) three.parameters.push_back(candidates_.parameters[p]);
+    for (const std::size_t p : slip->parameters) three.parameters.push_back(candidates_.parameters[p]);
     const auto model = prepare(at.set, robot_, "diagnosis");
     const Eigen::MatrixXd columns = linearised(at, *model, rows_, three).derivative;
     for (int c = 0; c < 3; ++c) {
@@ -266,8 +268,9 @@ Explanation EffectSearch::search(const Estimate& at, const std::vector<bool>& co
   Scanned scanned;
   const auto scan = [&](const ResidualAnalysis& left, std::size_t per_joint) {
     add_locals(system, scanned, local_curves(system, left, rows_, per_joint, least_touched_), rows_);
-    if (slip_candidate < candidates_.list.size())
-      add_slips(system, slips(system, left, rows_, point, 2), rows_, point, slip_candidate, slip_parameters);
+    if (has_slip)
+      add_slips(system, slips(system, left, rows_, point, 2), rows_, point,
+                static_cast<std::size_t>(slip - candidates_.list.begin()), *slip);
     search.extend();
   };
   if (before != nullptr) {
@@ -284,7 +287,7 @@ Explanation EffectSearch::search(const Estimate& at, const std::vector<bool>& co
     scan(remainder(search, best), 1);
     // Each scanned one is looked for anew with the others in place: the first look had them in the way.
     for (const std::size_t b : best.blocks) {
-      if (system.blocks[b].width_rad == 0 && system.blocks[b].id.effect != Effect::reflector_slip) continue;
+      if (system.blocks[b].width_rad == 0 && !is_step(system.blocks[b].id)) continue;
       Subset others;
       for (const std::size_t o : best.blocks) {
         if (o != b) others.push_back(o);
@@ -483,7 +486,7 @@ Explanation EffectSearch::explain(const std::function<void(double)>& progress) c
     if (rows_.size() <= most_few_rows) tries.emplace_back(rows_.size(), true);
     const GapSystem everything =
         gap_system(robot_, rows_, std::vector<bool>(rows_.size(), true), extended(nuisance_of(refit), &best),
-                   fitted_, CandidateSet{candidates_.set, {}, {}, {}, false});
+                   fitted_, CandidateSet{candidates_.set, {}, {}, {}});
     std::vector<bool> aligned;
     std::size_t most = 0;
     const auto model = prepare(refit.fit.estimate.set, robot_, "diagnosis");
@@ -575,65 +578,12 @@ std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution,
 Misfit misfit_of(const FoundEffect& effect, const std::vector<PlaceShare>& places) {
   Misfit m;
   const EffectId& id = effect.id;
-  const auto theta = [](unsigned joint) { return Place{static_cast<std::uint8_t>(joint), slot::theta}; };
-  m.joint = id.joint;
-  switch (id.effect) {
-    case Effect::link_gravity:
-      m.place = theta(2);
-      m.joint = 2;
-      m.covariates = {"q2", "q3"};
-      break;
-    case Effect::axis_wobble:
-      m.place = {static_cast<std::uint8_t>(id.joint), slot::alpha};
-      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
-      break;
-    case Effect::joint_compliance:
-    case Effect::nonlinear_compliance:
-      m.place = theta(id.joint);
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::backlash:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::direction, id.joint)};
-      break;
-    case Effect::readout_lag:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::relative_speed, id.joint)};
-      break;
-    case Effect::joint_coupling:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::joint_position, id.from)};
-      break;
-    case Effect::link_bending:
-      m.place = {static_cast<std::uint8_t>(id.link), slot::alpha};
-      m.joint = id.link;
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::thermal_growth:
-      m.place = {static_cast<std::uint8_t>(std::max(1U, id.link)), slot::a};
-      m.joint = id.link;
-      m.covariates = {"temp_c"};
-      break;
-    case Effect::base_drift:
-      m.place = {body::base, slot::x};
-      m.covariates = {"time_s"};
-      break;
-    case Effect::base_compliance:
-      m.place = {body::base, slot::rx};
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::payload_error:
-      m.place = {body::load, slot::mass};
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::reflector_slip:
-      m.place = {body::point, slot::x};
-      m.covariates = {"time_s"};
-      break;
-    default:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
-      break;
+  const EffectDescriptor& d = descriptor(id.effect);
+  m.place = d.place(id);
+  m.joint = d.has(Selector::link) ? id.link : is_link(m.place) ? m.place.body : 0;
+  const Follows follows = d.follows(id);
+  for (const unsigned joint : follows.joint) {
+    if (joint != 0 || m.covariates.empty()) m.covariates.push_back(covariate_name(follows.covariate, joint));
   }
   m.around_deg.assign(m.covariates.size(), std::nullopt);
   for (const PlaceShare& p : places) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -15,13 +17,6 @@ namespace {
 /// Of more effects than these the verdict gives the number: the table below names them.
 constexpr std::size_t named_in_full = 5;
 constexpr double arcsec_per_rad = 180.0 * 3600.0 / pi;
-
-/// once, twice, 3 times, 2.5 times
-std::string times(double n) {
-  if (n == 1) return "once";
-  if (n == 2) return "twice";
-  return fmt::format("{:g} times", n);
-}
 
 std::string with_sigma(double value, double sigma) { return fmt::format("{:.4g} +- {:.2g}", value, sigma); }
 
@@ -78,53 +73,8 @@ std::string curve_size(const KeyedCoefficients& c) {
 }  // namespace
 
 std::string in_words(const EffectId& id) {
-  const std::string joint = fmt::format("joint {}", id.joint);
-  switch (id.effect) {
-    case Effect::joint_compliance:
-      return joint + " yields to the load";
-    case Effect::link_gravity:
-      return "upper arm and forearm sag under their own weight";
-    case Effect::nonlinear_compliance:
-      return joint + " yields to the load otherwise than in proportion";
-    case Effect::gear_harmonic:
-      return fmt::format("{} has an error that comes {} per turn of the joint", joint, times(id.order));
-    case Effect::joint_curve:
-      return fmt::format("{} has an error that is a curve over its angle{}", joint,
-                         id.factor == Factor::load_torque   ? ", times the load's torque"
-                         : id.factor == Factor::temperature ? ", times the warming"
-                         : id.factor == Factor::payload     ? ", times the payload"
-                                                            : "");
-    case Effect::backlash:
-      return joint + " stays behind by half a gap, on the side it comes from";
-    case Effect::readout_lag:
-      return joint + " was read before the arm had stopped";
-    case Effect::encoder_scale:
-      return joint + " turns a little more or less than it reads";
-    case Effect::joint_coupling:
-      return fmt::format("{} turns along when joint {} does", joint, id.from);
-    case Effect::axis_wobble:
-      return fmt::format("the axis of {} wobbles {} per turn", joint, times(id.order));
-    case Effect::link_bending:
-      return fmt::format("link {} bends sideways under the load", id.link);
-    case Effect::thermal_growth:
-      return id.link == 0 ? "all links grow with the temperature"
-                          : fmt::format("link {} grows with the temperature", id.link);
-    case Effect::base_drift:
-      return "the base drifts against the instrument while time passes";
-    case Effect::base_compliance:
-      return fmt::format("the base tilts under the load, about a pivot at z = {:.0f} mm", id.pivot_z_m * 1e3);
-    case Effect::payload_error:
-      return "the payload is not what was declared";
-    case Effect::reflector_slip:
-      return fmt::format("the measured point slipped after {:.0f} s", id.after_s);
-    case Effect::unnamed:
-      return fmt::format("{} moves as a function of {} and {} that no effect of the catalogue is",
-                         place_name(id.place), covariate_name(id.covariate[0], id.covariate_joint[0]),
-                         covariate_name(id.covariate[1], id.covariate_joint[1]));
-    case Effect::geometric:
-      break;
-  }
-  return "geometry";
+  const auto sentence = descriptor(id.effect).sentence;
+  return sentence == nullptr ? "geometry" : sentence(id);
 }
 
 std::string where_sentence(const Misfit& where) {
@@ -182,7 +132,7 @@ std::vector<KeyedCoefficients> by_key(const FoundEffect& effect) {
 
 std::vector<std::string> sizes(const FoundEffect& effect) {
   std::vector<std::string> lines;
-  if (effect.id.effect == Effect::gear_harmonic && effect.coefficients.size() == 2) {
+  if (effect.id.order != 0 && effect.coefficients.size() == 2) {
     const std::string text = amplitude(effect);
     if (!text.empty()) lines.push_back(text);
   }

@@ -201,12 +201,10 @@ Refit refit_with(const Robot& robot, const std::vector<Observation>& rows, const
     for (std::size_t k = first; k < model.parameters.size(); ++k) {
       if (!free[k - first]) continue;
       PriorKnowledge prior;
-      if (piece.id.effect == Effect::joint_compliance || piece.id.effect == Effect::backlash ||
-          piece.id.effect == Effect::readout_lag)
-        prior.least = 0;
+      const EffectDescriptor& d = descriptor(piece.id.effect);
+      if (d.is_nonnegative) prior.least = 0;
       // No effect is a hundred times its usual size: where only a part of it is known, the rest stays small.
-      if (piece.id.effect != Effect::joint_compliance && piece.id.effect != Effect::link_gravity)
-        prior.tolerance = 100 * unit_of(model.parameters[k], model.set);
+      if (!d.in_paper_model) prior.tolerance = 100 * unit_of(model.parameters[k], model.set);
       move_too(model.parameters[k], prior);
     }
   }

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "linalg/blas.hpp"
+#include "model/covariate.hpp"
 
 namespace flexcomp::host {
 

@@ -107,7 +107,7 @@ ScatteredModel scattered_model(const Robot& robot, const std::vector<Observation
   std::vector<double> weights = weight;
   for (int round = 0; round < 3; ++round) {
     const GapSystem system = gap_system(robot, rows, std::vector<bool>(rows.size(), true), estimate, fitted,
-                                        CandidateSet{estimate.set, {}, {}, {}, false});
+                                        CandidateSet{estimate.set, {}, {}, {}});
     Eigen::VectorXd residual(6 * static_cast<Eigen::Index>(rows.size()));
     const auto model = prepare(estimate.set, robot, "diagnosis");
     const std::vector<RowResidual> r = residuals(estimate, *model, rows);

@@ -10,7 +10,7 @@
 #include "exchange/urdf_file.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {

@@ -222,7 +222,7 @@ LeftOut left_out_by_rigid(const Calibration& calibration, const Robot& robot, st
   const auto whole = prepare(set, robot, calibration.path);
   std::vector<std::unique_ptr<HostModel>> single;
   for (const EffectGroup& group : effects_of(set, robot.nominal)) {
-    if (is_measurement_effect(group.id.effect)) continue;
+    if (belongs_to_measurement(group.id.effect)) continue;
     TermSet one = rigid_part(set);
     one.tables = set.tables;
     one.values = set.values;

@@ -15,7 +15,9 @@
 #include "files/write_file.hpp"
 #include "files/yaml_field.hpp"
 #include "files/yaml_text.hpp"
+#include "model/covariate.hpp"
 #include "model/effects.hpp"
+#include "model/place.hpp"
 #include "nearest.hpp"
 #include "quaternion.hpp"
 
@@ -139,72 +141,67 @@ class SetReader {
   static EffectId identity(const YamlField& entry, Effect effect, std::vector<std::string>& selectors) {
     EffectId id;
     id.effect = effect;
-    const auto joint = [&](const char* key) {
+    const EffectDescriptor& d = descriptor(effect);
+    const auto number = [&](const char* key) {
       selectors.emplace_back(key);
       return entry.at(key).integer(1, joint_count);
     };
-    switch (effect) {
-      case Effect::joint_compliance:
-      case Effect::nonlinear_compliance:
-      case Effect::backlash:
-      case Effect::readout_lag:
-      case Effect::encoder_scale:
-        id.joint = joint("joint");
-        break;
-      case Effect::gear_harmonic:
-      case Effect::axis_wobble:
-        id.joint = joint("joint");
-        selectors.emplace_back("order");
-        id.order = entry.at("order").number(unit::si, 0, "an order above 0");
-        break;
-      case Effect::joint_coupling:
-        id.joint = joint("joint");
-        id.from = joint("from");
-        break;
-      case Effect::joint_curve:
-        id.joint = joint("joint");
-        selectors.emplace_back("factor");
-        id.coefficients = entry.at("coefficients_rad").items().size();
-        if (const auto field = entry.find("factor")) id.factor = factor(*field);
-        break;
-      case Effect::link_bending:
-        id.link = joint("link");
-        break;
-      case Effect::thermal_growth:
-        selectors.emplace_back("link");
-        if (entry.has("link")) id.link = entry.at("link").integer(1, joint_count);
-        break;
-      case Effect::base_compliance:
-        selectors.emplace_back("pivot_z_mm");
-        id.pivot_z_m = entry.number_or("pivot_z_mm", unit::mm, 0);
-        break;
-      case Effect::reflector_slip:
-        selectors.emplace_back("after_s");
-        id.after_s = entry.at("after_s").number(unit::si);
-        break;
-      case Effect::unnamed:
-        selectors.insert(selectors.end(), {"place", "of", "grid"});
-        unnamed(entry, id);
-        break;
-      default:
-        break;
+    for (const Selector s : d.selectors) {
+      switch (s) {
+        case Selector::joint:
+          id.joint = number("joint");
+          break;
+        case Selector::from:
+          id.from = number("from");
+          break;
+        case Selector::link:
+          if (d.all_links_by_default && !entry.has("link")) {
+            selectors.emplace_back("link");
+          } else {
+            id.link = number("link");
+          }
+          break;
+        case Selector::order:
+          selectors.emplace_back("order");
+          id.order = entry.at("order").number(unit::si, 0, "an order above 0");
+          break;
+        case Selector::size:
+          id.coefficients = entry.at("coefficients_rad").items().size();
+          break;
+        case Selector::factor:
+          selectors.emplace_back("factor");
+          if (const auto field = entry.find("factor")) {
+            const auto factor = factor_of(field->text());
+            if (!factor) throw field->error("one of load_torque, temperature, payload");
+            id.factor = *factor;
+          }
+          break;
+        case Selector::pivot:
+          selectors.emplace_back("pivot_z_mm");
+          id.pivot_z_m = entry.number_or("pivot_z_mm", unit::mm, 0);
+          break;
+        case Selector::after:
+          selectors.emplace_back("after_s");
+          id.after_s = entry.at("after_s").number(unit::si);
+          break;
+        case Selector::place: {
+          selectors.emplace_back("place");
+          const YamlField field = entry.at("place");
+          const auto place = place_of(field.text());
+          if (!place) throw field.error("a place such as link3.theta");
+          id.place = *place;
+          break;
+        }
+        case Selector::grid:
+          selectors.insert(selectors.end(), {"of", "grid"});
+          read_grid(entry, id);
+          break;
+      }
     }
     return id;
   }
 
-  static Factor factor(const YamlField& field) {
-    const std::string text = field.text();
-    for (const auto& [f, factor_text] : factor_names) {
-      if (text == factor_text) return f;
-    }
-    throw field.error("one of load_torque, temperature, payload");
-  }
-
-  static void unnamed(const YamlField& entry, EffectId& id) {
-    const YamlField place_field = entry.at("place");
-    const auto place = place_of(place_field.text());
-    if (!place) throw place_field.error("a place such as link3.theta");
-    id.place = *place;
+  static void read_grid(const YamlField& entry, EffectId& id) {
     const YamlField of = entry.at("of");
     const YamlField grid = entry.at("grid");
     const auto names = of.items();
@@ -224,7 +221,7 @@ class SetReader {
   /// Numbers of a curve (a list) or a grid (a list of rows).
   static std::vector<double> numbers(const YamlField& field, const EffectId& id, const Unit& unit) {
     std::vector<double> values;
-    if (id.effect == Effect::joint_curve) {
+    if (descriptor(id.effect).table == TableKind::curve) {
       for (const YamlField& item : field.items()) values.push_back(item.number(unit));
       if (values.size() != id.coefficients) throw field.error(fmt::format("{} numbers", id.coefficients));
       return values;
@@ -266,17 +263,10 @@ class SetReader {
     out_.value_sigma.resize(out_.terms.values.size(), none);
   }
 
- public:
-  static const std::vector<std::pair<Factor, std::string>> factor_names;
-
- private:
   Calibration& out_;
   const Robot& robot_;
   std::map<std::string, std::size_t> seen_;
 };
-
-const std::vector<std::pair<Factor, std::string>> SetReader::factor_names{
-    {Factor::load_torque, "load_torque"}, {Factor::temperature, "temperature"}, {Factor::payload, "payload"}};
 
 Frame read_frame(const YamlField& field) {
   field.require_keys({"xyz_mm", "quaternion_wxyz"});
@@ -408,7 +398,7 @@ std::string list_text(const std::vector<std::string>& items) {
 
 /// Numbers of a curve as a list, of a grid as a list of rows.
 std::string values_text(const EffectId& id, const std::vector<std::string>& values) {
-  if (id.effect == Effect::joint_curve) return list_text(values);
+  if (descriptor(id.effect).table == TableKind::curve) return list_text(values);
   const auto columns = static_cast<std::ptrdiff_t>(id.node[1].size());
   std::vector<std::string> rows;
   for (auto at = values.begin(); at != values.end(); at += columns)
@@ -418,34 +408,55 @@ std::string values_text(const EffectId& id, const std::vector<std::string>& valu
 
 std::vector<std::string> selectors_text(const EffectId& id) {
   std::vector<std::string> parts{"effect: " + effect_name(id.effect)};
-  if (id.joint != 0) parts.push_back(fmt::format("joint: {}", id.joint));
-  if (id.from != 0) parts.push_back(fmt::format("from: {}", id.from));
-  if (id.link != 0) parts.push_back(fmt::format("link: {}", id.link));
-  if (id.order != 0) parts.push_back("order: " + number(id.order, unit::si));
-  if (id.effect == Effect::base_compliance) parts.push_back("pivot_z_mm: " + number(id.pivot_z_m, unit::mm));
-  if (id.effect == Effect::reflector_slip) parts.push_back("after_s: " + number(id.after_s, unit::si));
-  for (const auto& [factor, factor_text] : SetReader::factor_names) {
-    if (id.effect == Effect::joint_curve && id.factor == factor) parts.push_back("factor: " + factor_text);
-  }
-  if (id.effect == Effect::unnamed) {
-    std::vector<std::string> names;
-    std::vector<std::string> sides;
-    for (std::size_t side = 0; side < 2; ++side) {
-      names.push_back(covariate_name(id.covariate[side], id.covariate_joint[side]));
-      std::vector<std::string> nodes;
-      for (const double v : id.node[side]) nodes.push_back(number(v, covariate_unit(id.covariate[side])));
-      sides.push_back(list_text(nodes));
+  for (const Selector s : descriptor(id.effect).selectors) {
+    switch (s) {
+      case Selector::joint:
+        parts.push_back(fmt::format("joint: {}", id.joint));
+        break;
+      case Selector::from:
+        parts.push_back(fmt::format("from: {}", id.from));
+        break;
+      case Selector::link:
+        if (id.link != 0) parts.push_back(fmt::format("link: {}", id.link));
+        break;
+      case Selector::order:
+        parts.push_back("order: " + number(id.order, unit::si));
+        break;
+      case Selector::pivot:
+        parts.push_back("pivot_z_mm: " + number(id.pivot_z_m, unit::mm));
+        break;
+      case Selector::after:
+        parts.push_back("after_s: " + number(id.after_s, unit::si));
+        break;
+      case Selector::factor:
+        if (id.factor != Factor::one) parts.push_back("factor: " + factor_name(id.factor));
+        break;
+      case Selector::place:
+        parts.push_back("place: " + place_name(id.place));
+        break;
+      case Selector::grid: {
+        std::vector<std::string> names;
+        std::vector<std::string> sides;
+        for (std::size_t side = 0; side < 2; ++side) {
+          names.push_back(covariate_name(id.covariate[side], id.covariate_joint[side]));
+          std::vector<std::string> nodes;
+          for (const double v : id.node[side]) nodes.push_back(number(v, covariate_unit(id.covariate[side])));
+          sides.push_back(list_text(nodes));
+        }
+        parts.push_back("of: " + list_text(names));
+        parts.push_back("grid: " + list_text(sides));
+        break;
+      }
+      case Selector::size:
+        break;
     }
-    parts.push_back("place: " + place_name(id.place));
-    parts.push_back("of: " + list_text(names));
-    parts.push_back("grid: " + list_text(sides));
   }
   return parts;
 }
 
 std::string effect_text(const Calibration& c, const EffectGroup& group) {
   std::vector<std::string> parts = selectors_text(group.id);
-  if (group.id.effect == Effect::joint_curve || group.id.effect == Effect::unnamed) {
+  if (descriptor(group.id.effect).table != TableKind::none) {
     std::vector<std::string> values;
     std::vector<std::string> sigmas;
     bool any_sigma = false;

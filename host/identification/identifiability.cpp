@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <random>
 
+#include "model/effects/descriptor.hpp"
+
 namespace flexcomp::host {
 
 Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix) {
@@ -78,8 +80,8 @@ std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermS
       if (term.place.slot == slot::z) return 10;
       return term.place.slot == slot::rz ? 11 : 1;
     }
-    if (term.effect == Effect::joint_compliance) return term.place.body == 1 ? 12 : 3;
-    return term.effect == Effect::link_gravity ? 3 : 4;
+    const auto effect_rank = descriptor(term.effect).elimination_rank;
+    return effect_rank == nullptr ? 4 : effect_rank(term.place);
   };
   std::vector<std::size_t> order(unknowns.count());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;

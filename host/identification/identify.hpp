@@ -16,7 +16,7 @@
 #include "identification/statistics.hpp"
 #include "measurement/repeats.hpp"
 #include "model/calibration.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 
 namespace flexcomp::host {
 

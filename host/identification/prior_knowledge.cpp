@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "identification/prior_knowledge.hpp"
 
+#include "model/effects/descriptor.hpp"
+
 #include <cstddef>
 
 namespace flexcomp::host {
@@ -9,8 +11,8 @@ std::vector<PriorKnowledge> prior_knowledge(const TermSet& set, const std::vecto
                                             bool physical, const std::vector<Tolerance>& tolerances) {
   std::vector<PriorKnowledge> list(parameters.size());
   for (std::size_t p = 0; p < parameters.size(); ++p) {
-    if (physical && set.terms[parameters[p].terms.front()].effect == Effect::joint_compliance)
-      list[p].least = 0;
+    const EffectDescriptor& d = descriptor(set.terms[parameters[p].terms.front()].effect);
+    if (physical && d.in_paper_model && d.is_nonnegative) list[p].least = 0;
   }
   for (const Tolerance& tolerance : tolerances) {
     for (const std::size_t p : parameters_meant(tolerance, parameters)) {

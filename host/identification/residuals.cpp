@@ -6,6 +6,8 @@
 
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
+#include "model/effects/descriptor.hpp"
+#include "model/place.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -215,33 +217,9 @@ std::vector<std::size_t> free_frames(const std::vector<Observation>& rows) {
 
 double unit_of(const Parameter& parameter, const TermSet& set) {
   const Term<double>& term = set.terms[parameter.terms.front()];
-  const bool length = (term.place.body >= 1 && term.place.body <= body::max_link)
-                          ? (term.place.slot == slot::d || term.place.slot == slot::a)
-                          : term.place.slot <= slot::z;
-  switch (term.effect) {
-    case Effect::geometric:
-      return length ? 1e-4 : radians(0.05);
-    case Effect::joint_compliance:
-      return 1e-5;
-    case Effect::link_gravity:
-      return 1e-3;
-    case Effect::nonlinear_compliance:
-      return 1e-6;
-    case Effect::readout_lag:
-      return 1e-3;
-    case Effect::link_bending:
-      return 1e-6;
-    case Effect::base_compliance:
-      return 1e-7;
-    case Effect::thermal_growth:
-      return 1e-5;
-    case Effect::base_drift:
-      return length ? 1e-5 / 3600 : radians(0.001) / 3600;
-    case Effect::payload_error:
-      return term.place.slot == slot::mass ? 0.1 : 0.01;
-    default:
-      return 1e-4;
-  }
+  if (term.effect == Effect::geometric) return is_length(term.place) ? 1e-4 : radians(0.05);
+  const auto usual_size = descriptor(term.effect).usual_size;
+  return usual_size == nullptr ? 1e-4 : usual_size(term.place);
 }
 
 Eigen::VectorXd units_of(const Unknowns& unknowns, const TermSet& set) {

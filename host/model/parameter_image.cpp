@@ -11,6 +11,7 @@
 #include "input_error.hpp"
 #include "model/effects.hpp"
 #include "model/host_model.hpp"
+#include "model/place.hpp"
 
 namespace flexcomp::host {
 
@@ -25,7 +26,7 @@ struct Collector {
     return Refusal::none;
   }
   Refusal term(const Term<double>& t) {
-    if (t.place.body == body::point || is_measurement_effect(t.effect)) return Refusal::bad_place;
+    if (t.place.body == body::point || belongs_to_measurement(t.effect)) return Refusal::bad_place;
     set.terms.push_back(t);
     return Refusal::none;
   }
@@ -40,7 +41,7 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
   pushed.tables = calibration.terms.tables;
   pushed.values = calibration.terms.values;
   for (const Term<double>& t : calibration.terms.terms) {
-    if (is_measurement_effect(t.effect) || t.place.body == body::point) continue;
+    if (belongs_to_measurement(t.effect) || t.place.body == body::point) continue;
     // With fitted frames the base is part of F, and the controller's target is in the robot's own base anyway.
     if (t.place.body == body::base && t.effect == Effect::geometric && calibration.frames) continue;
     if (t.effect == Effect::unnamed && !options.allow_unnamed) {
@@ -72,7 +73,7 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
 std::vector<std::string> never_pushed(const Calibration& calibration, const Robot& robot) {
   std::vector<std::string> names;
   for (const EffectGroup& group : effects_of(calibration.terms, robot.nominal)) {
-    if (is_measurement_effect(group.id.effect)) names.push_back(name(group.id));
+    if (belongs_to_measurement(group.id.effect)) names.push_back(name(group.id));
   }
   return names;
 }

@@ -14,7 +14,7 @@
 
 #include "flexcomp/model.hpp"
 #include "measurement/measured_data.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {

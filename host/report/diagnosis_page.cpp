@@ -6,6 +6,8 @@
 
 #include "diagnosis/effect_profile.hpp"
 #include "diagnosis/messages.hpp"
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 #include "report/numbers.hpp"
 #include "report/parameters.hpp"
 #include "report/plots.hpp"

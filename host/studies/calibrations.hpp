@@ -15,7 +15,7 @@
 #include "identification/residuals.hpp"
 #include "measurement/noise_level.hpp"
 #include "measurement/observation.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 #include "studies/paper.hpp"
 
 namespace flexcomp::host {

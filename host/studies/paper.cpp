@@ -9,8 +9,8 @@
 #include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
-#include "model/effects.hpp"
 #include "model/host_model.hpp"
+#include "model/paper_model.hpp"
 #include "studies/robot_texts.hpp"
 #include "units.hpp"
 

@@ -269,8 +269,7 @@ inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, con
       // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that
       // follows it would move the arm without a bound on the change per cycle.
       if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
-          t.basis == Basis::relative_speed || t.effect == Effect::base_drift ||
-          t.effect == Effect::readout_lag || t.effect == Effect::reflector_slip) {
+          t.basis == Basis::relative_speed || belongs_to_measurement(t.effect)) {
         return Refusal::bad_place;
       }
       return model.add(t);

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "flexcomp/effect.hpp"
+
 namespace flexcomp {
 
 /// The part of the arm that a place belongs to. The numbers are on the wire: add, never change.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "judge.hpp"
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 
 #include <fmt/format.h>
 #include <time.h>

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "oracle.hpp"
+#include "model/covariate.hpp"
+#include "model/paper_model.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

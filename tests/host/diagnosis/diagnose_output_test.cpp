@@ -101,7 +101,7 @@ struct Hidden {
     e.delta_bic = 123.4;
     e.largest_m = 0.5e-3;
     e.rms_m = 0.2e-3;
-    e.pushed = !is_measurement_effect(id.effect);
+    e.pushed = !belongs_to_measurement(id.effect);
     d.effects = {e};
     d.residuals_before = residuals_with(robot, before, data);
     d.residuals_after = residuals_with(robot, after, data);

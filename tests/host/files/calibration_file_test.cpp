@@ -161,7 +161,7 @@ TEST(Image, LeavesOutWhatBelongsToTheMeasurement) {
   const Calibration pulled =
       calibration_from_image(make_image(c, tx60l(), 1, {.allow_unnamed = true}), tx60l(), "bus");
   for (const Term<double>& t : pulled.terms.terms) {
-    EXPECT_FALSE(is_measurement_effect(t.effect));
+    EXPECT_FALSE(belongs_to_measurement(t.effect));
     EXPECT_FALSE(t.effect == Effect::geometric && t.place.body == body::base) << "frames are fitted";
   }
   Calibration nominal_frames = c;

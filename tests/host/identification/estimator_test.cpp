@@ -16,6 +16,7 @@
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
 #include "input_error.hpp"
+#include "model/paper_model.hpp"
 #include "support/measuring.hpp"
 #include "support/text_file.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "identification/identifiability.hpp"
-#include "model/effects.hpp"
+#include "model/paper_model.hpp"
 #include "support/arms.hpp"
 
 namespace {

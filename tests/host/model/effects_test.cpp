@@ -12,6 +12,7 @@
 #include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "model/host_model.hpp"
+#include "model/paper_model.hpp"
 #include "support/text_file.hpp"
 
 namespace {
@@ -75,37 +76,10 @@ TEST(PaperModel, TheTruthOfTheFileIsTheSameModel) {
   EXPECT_DOUBLE_EQ(truth.terms.terms[31].coefficient, 1 / 6.67e4);
 }
 
-/// One id of every effect.
+/// One id of every effect, and growth of one link beside that of all.
 std::vector<EffectId> one_of_each() {
-  std::vector<EffectId> ids;
-  const auto add = [&ids](Effect effect, unsigned joint = 0) -> EffectId& {
-    ids.push_back({});
-    ids.back().effect = effect;
-    ids.back().joint = joint;
-    return ids.back();
-  };
-  add(Effect::joint_compliance, 2);
-  add(Effect::link_gravity);
-  add(Effect::nonlinear_compliance, 3);
-  add(Effect::gear_harmonic, 3).order = 1.5;
-  add(Effect::joint_curve, 1).coefficients = 12;
-  add(Effect::backlash, 2);
-  add(Effect::readout_lag, 1);
-  add(Effect::encoder_scale, 3);
-  add(Effect::joint_coupling, 6).from = 5;
-  add(Effect::axis_wobble, 2).order = 2;
-  add(Effect::link_bending).link = 2;
-  add(Effect::thermal_growth);
-  add(Effect::thermal_growth).link = 4;
-  add(Effect::base_drift);
-  add(Effect::base_compliance).pivot_z_m = -0.375;
-  add(Effect::payload_error);
-  add(Effect::reflector_slip).after_s = 3600;
-  EffectId& unnamed = add(Effect::unnamed);
-  unnamed.place = {3, slot::theta};
-  unnamed.covariate = {Covariate::joint_position, Covariate::payload};
-  unnamed.covariate_joint = {2, 0};
-  unnamed.node = {std::vector<double>{-1, 0, 1}, std::vector<double>{0, 2}};
+  std::vector<EffectId> ids{{.effect = Effect::thermal_growth, .link = 4}};
+  for (const EffectDescriptor& d : all_effects()) ids.push_back(d.example);
   return ids;
 }
 
@@ -127,10 +101,12 @@ TEST(Catalogue, EveryEffectGoesInAndComesBackByName) {
 }
 
 TEST(Catalogue, NamesAreTheContracts) {
-  const std::vector<EffectId> ids = one_of_each();
-  EXPECT_EQ(name(ids[3]), "gear_harmonic[joint=3,order=1.5]");
-  EXPECT_EQ(name(ids[8]), "joint_coupling[joint=6,from=5]");
-  EXPECT_EQ(name(ids[1]), "link_gravity");
+  EXPECT_EQ(name({.effect = Effect::gear_harmonic, .joint = 3, .order = 1.5}),
+            "gear_harmonic[joint=3,order=1.5]");
+  EXPECT_EQ(name({.effect = Effect::joint_coupling, .joint = 6, .from = 5}),
+            "joint_coupling[joint=6,from=5]");
+  EXPECT_EQ(name({.effect = Effect::link_gravity}), "link_gravity");
+  EXPECT_EQ(name(descriptor(Effect::unnamed).example), "unnamed[place=link3.theta,of=q2+payload_kg]");
   for (const std::string& n : effect_names()) EXPECT_EQ(effect_name(*effect_of(n)), n);
 }
 

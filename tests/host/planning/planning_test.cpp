@@ -15,6 +15,7 @@
 #include "identification/residuals.hpp"
 #include "measurement/reflectors.hpp"
 #include "model/host_model.hpp"
+#include "model/paper_model.hpp"
 #include "planning/criterion.hpp"
 #include "planning/detmax.hpp"
 #include "planning/exchange.hpp"
