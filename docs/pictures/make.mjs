@@ -2,7 +2,7 @@
 import {statSync} from 'node:fs';
 import {join} from 'node:path';
 
-import {launch, open, settled} from '../../tests/report/browser.mjs';
+import {launch, open, settled} from '../../tests/host/report/browser.mjs';
 
 const [pages, pictures] = process.argv.slice(2);
 const largest = 150000;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "linalg/blas.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -64,11 +65,11 @@ double LeftOutPoses::chi2_per_number(const SubsetSearch& search, const Scored& s
       measured.segment<6>(to) = system.residual.segment<6>(from);
       left.segment<6>(to) = measured.segment<6>(to) - fitted.segment<6>(from);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(part * part.transpose());
-    const Eigen::VectorXd along = eigen.eigenvectors().transpose() * left;
-    const Eigen::VectorXd whole = eigen.eigenvectors().transpose() * measured;
+    const SymmetricEigen eigen = symmetric_eigen(part * part.transpose());
+    const Eigen::VectorXd along = eigen.vectors.transpose() * left;
+    const Eigen::VectorXd whole = eigen.vectors.transpose() * measured;
     for (Eigen::Index k = 0; k < size; ++k) {
-      const double others = 1 - eigen.eigenvalues()[k];
+      const double others = 1 - eigen.values[k];
       const double error = others > decides_alone ? along[k] / others : whole[k];
       sum += error * error;
     }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "identification/identifiability.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -79,7 +80,7 @@ std::vector<SuggestedPose> discriminating_poses(const Robot& robot, const std::v
         right += duel.rival.middleRows<6>(row).transpose() * duel.truth.segment<6>(row);
       }
       normal.diagonal().array() += 1e-9 * normal.diagonal().mean();
-      const Eigen::VectorXd missed = duel.truth - duel.rival * normal.ldlt().solve(right);
+      const Eigen::VectorXd missed = duel.truth - duel.rival * Ldlt(normal).solve(right);
       double by_now = missed.head(measured).squaredNorm();
       for (const std::size_t k : taken)
         by_now += missed.segment<6>(measured + 6 * static_cast<Eigen::Index>(k)).squaredNorm();

@@ -10,6 +10,7 @@
 #include "flexcomp/forward.hpp"
 
 #include "identification/fitted_calibration.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -52,7 +53,7 @@ struct Between {
       hats(k, cell) = 1 - share;
       hats(k, cell + 1) = share;
     }
-    nearest = (hats.transpose() * hats).llt().solve(hats.transpose());
+    nearest = Llt(hats.transpose() * hats).solve(Eigen::MatrixXd(hats.transpose()));
   }
   Eigen::VectorXd at;
   Eigen::MatrixXd nearest;  ///< node values = nearest * values

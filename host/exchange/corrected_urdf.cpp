@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,6 +21,7 @@
 #include "flexcomp/forward.hpp"
 #include "flexcomp/model.hpp"
 #include "input_error.hpp"
+#include "linalg/nearest_rotation.hpp"
 #include "model/effects.hpp"
 #include "model/frames.hpp"
 #include "model/host_model.hpp"
@@ -45,10 +45,8 @@ Pose<double> carry(const AxisChain& from, const AxisChain& to) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < joint_count; ++i)
     sum += to.axes[i].direction * from.axes[i].direction.transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   Pose<double> out;
-  out.rotation = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  out.rotation = nearest_rotation(sum);
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < joint_count; ++i) {

@@ -3,10 +3,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <memory>
+
+#include "distributions.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -73,7 +74,7 @@ Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
   const Eigen::Index n = q.gradient.size();
   Eigen::MatrixXd damped = q.normal;
   damped.diagonal().array() += mu;
-  Eigen::VectorXd dx = damped.ldlt().solve(q.gradient);
+  Eigen::VectorXd dx = Ldlt(damped).solve(q.gradient);
   if ((dx.array() >= q.least.array()).all()) return dx;
   std::vector<bool> held(static_cast<std::size_t>(n), false);
   damped = damped.selfadjointView<Eigen::Lower>();
@@ -112,7 +113,7 @@ Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
       reduced(i, i) = 1;
       right[i] = q.least[i];
     }
-    dx = reduced.ldlt().solve(right);
+    dx = Ldlt(reduced).solve(right);
   }
   return dx.cwiseMax(q.least);
 }
@@ -225,13 +226,12 @@ class Descent {
 
 /// 95 % of a normal distribution above `least`: symmetric in probability, or from `least` up.
 Interval allowed_interval(double mean, double sigma, double least, bool from_the_bound) {
-  const boost::math::normal standard;
   if (!(sigma > 0)) return {mean, mean};
   // Share of the distribution that is allowed; upper tails, because a mean far below the bound leaves 1e-20 of it.
-  const double allowed = boost::math::cdf(boost::math::complement(standard, (least - mean) / sigma));
+  const double allowed = normal_above((least - mean) / sigma);
   const auto with_above = [&](double tail) {
     const double p = std::max(allowed * tail, 1e-300);
-    return std::max(least, mean + sigma * boost::math::quantile(boost::math::complement(standard, p)));
+    return std::max(least, mean + sigma * normal_upper_quantile(p));
   };
   if (from_the_bound) return {least, with_above(0.05)};
   return {with_above(0.975), with_above(0.025)};
@@ -243,14 +243,11 @@ Eigen::MatrixXd without_frames(const Eigen::MatrixXd& normal, Eigen::Index frame
   if (frames == 0) return normal;
   return normal.bottomRightCorner(parameters, parameters) -
          normal.bottomLeftCorner(parameters, frames) *
-             normal.topLeftCorner(frames, frames).ldlt().solve(normal.topRightCorner(frames, parameters));
+             Ldlt(normal.topLeftCorner(frames, frames))
+                 .solve(Eigen::MatrixXd(normal.topRightCorner(frames, parameters)));
 }
 
 }  // namespace
-
-double chi2_quantile(double probability, double degrees_of_freedom) {
-  return boost::math::quantile(boost::math::chi_squared(degrees_of_freedom), probability);
-}
 
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const Robot& robot, const EstimatorOptions& options) {
@@ -318,8 +315,8 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
   const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
   const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
   const Eigen::MatrixXd normal = quadratic.normal.selfadjointView<Eigen::Lower>();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  out.covariance = factor.solve(Eigen::MatrixXd::Identity(columns, columns));
+  const Ldlt factor(normal);
+  out.covariance = factor.inverse();
   if (out.degrees_of_freedom >= 1 && out.chi2 > chi2_quantile(0.9995, out.degrees_of_freedom)) {
     // The noise that was declared does not explain the residuals: they themselves say how uncertain the result is.
     out.covariance *= out.chi2 / out.degrees_of_freedom;
@@ -335,11 +332,8 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
         allowed_interval(unbounded, sigma, unknowns.prior_of(p).least, out.at_bound.back()));
   }
   if (options.spectrum && columns > frames) {
-    out.singular_values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(without_frames(normal, frames))
-                              .eigenvalues()
-                              .cwiseMax(0)
-                              .cwiseSqrt()
-                              .reverse();
+    out.singular_values =
+        symmetric_eigen(without_frames(normal, frames)).values.cwiseMax(0).cwiseSqrt().reverse();
   }
   return out;
 }

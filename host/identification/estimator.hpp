@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "distributions.hpp"
 #include "identification/residuals.hpp"
 #include "interval.hpp"
 
@@ -56,9 +57,6 @@ struct Fit {
 /// bounded problem.
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const Robot& robot, const EstimatorOptions& options = {});
-
-/// Quantile of the chi-square distribution.
-double chi2_quantile(double probability, double degrees_of_freedom);
 
 }  // namespace flexcomp::host
 

@@ -4,6 +4,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "linalg/decompositions.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -41,8 +43,7 @@ Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Rob
   const Eigen::VectorXd units = units_of(fitted, fit.estimate.set);
   const Eigen::VectorXd sigma = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt().cwiseProduct(units);
   keep_what_was_identified(out, fit.estimate.set, fitted, sigma);
-  out.covariance = CovarianceFactor{names_of(fitted),
-                                    units.asDiagonal() * Eigen::MatrixXd(fit.covariance.llt().matrixL())};
+  out.covariance = CovarianceFactor{names_of(fitted), units.asDiagonal() * Llt(fit.covariance).lower()};
   if (!fitted.frames.empty())
     out.frames = MeasurementFrames{Frame::of(fit.estimate.f), Frame::of(fit.estimate.e)};
   for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {

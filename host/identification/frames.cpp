@@ -7,18 +7,13 @@
 
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
+#include "linalg/nearest_rotation.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-}
 
 /// R_k = F N_k E for all rows: alternating nearest rotations from 24 starts (the turns of a cube), best kept.
 void align_rotations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model,

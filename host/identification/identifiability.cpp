@@ -5,14 +5,14 @@
 #include <algorithm>
 #include <random>
 
+#include "linalg/decompositions.hpp"
 #include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
 
 Eigen::MatrixXd triangular_factor(const Eigen::MatrixXd& matrix) {
   if (matrix.rows() <= matrix.cols()) return matrix;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(matrix);
-  return qr.matrixQR().topRows(matrix.cols()).triangularView<Eigen::Upper>();
+  return upper_factor(matrix);
 }
 
 Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::size_t>& order,
@@ -51,7 +51,7 @@ Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::si
       kept.col(k) =
           matrix.col(static_cast<Eigen::Index>(kept_in_order[static_cast<std::size_t>(k)])).normalized();
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(kept);
+    const PivotedQr qr(kept);
     for (const std::size_t c : lost) {
       const Eigen::VectorXd share = qr.solve(matrix.col(static_cast<Eigen::Index>(c)).normalized());
       LostColumn entry{c, {}};

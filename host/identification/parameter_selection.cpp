@@ -7,6 +7,8 @@
 #include <numeric>
 #include <set>
 
+#include "linalg/decompositions.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -23,11 +25,7 @@ Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>&
 
 /// Standard deviations in units from an information matrix.
 Eigen::VectorXd sigmas(const Eigen::MatrixXd& information) {
-  return information.ldlt()
-      .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()))
-      .diagonal()
-      .cwiseMax(0)
-      .cwiseSqrt();
+  return Ldlt(information).inverse().diagonal().cwiseMax(0).cwiseSqrt();
 }
 
 Eigen::MatrixXd information(const Eigen::MatrixXd& matrix) { return matrix.transpose() * matrix; }
@@ -96,7 +94,7 @@ std::vector<SuggestedPose> poses_that_cure(Judge judge, const Eigen::MatrixXd& r
   const Eigen::Index columns = judge.data.cols();
   // A weak prior of 100 units stands in for what the data do not know.
   Eigen::MatrixXd covariance =
-      (information(judge.data) + 1e-4 * Eigen::MatrixXd::Identity(columns, columns)).inverse();
+      inverse(information(judge.data) + 1e-4 * Eigen::MatrixXd::Identity(columns, columns));
   std::vector<SuggestedPose> chosen;
   std::set<Eigen::Index> taken;
   while (chosen.size() < most && !judge.knows_all()) {
@@ -117,7 +115,7 @@ std::vector<SuggestedPose> poses_that_cure(Judge judge, const Eigen::MatrixXd& r
     const Eigen::MatrixXd h = reference.middleRows<6>(6 * which);
     const Eigen::MatrixXd ch = covariance * h.transpose();
     const Eigen::MatrixXd gain = Eigen::MatrixXd::Identity(6, 6) + h * ch;
-    covariance -= ch * gain.ldlt().solve(ch.transpose());
+    covariance -= ch * Ldlt(gain).solve(Eigen::MatrixXd(ch.transpose()));
     judge.data.conservativeResize(judge.data.rows() + 6, Eigen::NoChange);
     judge.data.bottomRows<6>() = h;
     const Observation& row = reference_rows[static_cast<std::size_t>(which)];

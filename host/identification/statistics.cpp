@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "identification/estimator.hpp"
+#include "distributions.hpp"
 
 namespace flexcomp::host {
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -42,7 +43,7 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
   const Eigen::MatrixXd a = lin.derivative * (units.cwiseInverse().asDiagonal() * covariance.factor);
   const Eigen::VectorXd ar = a.transpose() * lin.residual;
   const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(a.cols(), a.cols()) + a.transpose() * a;
-  return lin.residual.squaredNorm() - ar.dot(inner.llt().solve(ar));
+  return lin.residual.squaredNorm() - ar.dot(Llt(inner).solve(ar));
 }
 
 Estimate estimate_of(const Calibration& calibration) {

@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 #include "measurement/reflectors.hpp"
 
 namespace flexcomp::host {
@@ -17,7 +18,7 @@ Eigen::Vector3d spread(std::span<const Eigen::Vector3d> points) {
   Eigen::MatrixXd m(3, static_cast<Eigen::Index>(points.size()));
   for (std::size_t k = 0; k < points.size(); ++k) m.col(static_cast<Eigen::Index>(k)) = points[k];
   m.colwise() -= Eigen::Vector3d(m.rowwise().mean());
-  return Eigen::JacobiSVD<Eigen::MatrixXd>(m).singularValues();
+  return singular_values(m);
 }
 
 }  // namespace

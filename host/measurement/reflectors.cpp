@@ -3,13 +3,14 @@
 #include "model/frames.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "distributions.hpp"
+#include "linalg/decompositions.hpp"
+#include "linalg/nearest_rotation.hpp"
 
 namespace flexcomp::host {
 
@@ -25,10 +26,6 @@ Points transformed(const Pose<double>& pose, std::span<const Eigen::Vector3d> po
   Points out;
   for (const Eigen::Vector3d& p : points) out.emplace_back(pose.rotation * p + pose.position);
   return out;
-}
-
-double chi2_above(double chi2, double degrees_of_freedom) {
-  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), chi2));
 }
 
 /// All points but one.
@@ -66,11 +63,11 @@ double log_visibility(std::span<const Eigen::Vector3d> points, std::size_t moved
     block.leftCols<3>().setIdentity();
     block.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
   }
-  const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(rigid).householderQ();
+  const Eigen::MatrixXd q = orthogonal_factor(rigid);
   const Eigen::MatrixXd deformation =
       q.rightCols(rows - 6).transpose().middleCols(static_cast<Eigen::Index>(3 * moved), 3);
   double sum = 0;
-  const Eigen::VectorXd seen = Eigen::JacobiSVD<Eigen::MatrixXd>(deformation).singularValues();
+  const Eigen::VectorXd seen = singular_values(deformation);
   for (const double s : seen) {
     if (s > 1e-6) sum += std::log(s);
   }
@@ -101,12 +98,8 @@ RigidFit fit_rigid(std::span<const Eigen::Vector3d> measured_m, std::span<const 
   for (std::size_t k = 0; k < template_m.size(); ++k) {
     covariance += weight[k] * (measured_m[k] - to) * (template_m[k] - from).transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // Three or four points in a plane leave the third direction open: the determinant says which way it must point.
-  Eigen::Matrix3d handed = Eigen::Matrix3d::Identity();
-  handed(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   RigidFit fit;
-  fit.pose.rotation = svd.matrixU() * handed * svd.matrixV().transpose();
+  fit.pose.rotation = nearest_rotation(covariance);
   fit.pose.position = to - fit.pose.rotation * from;
   for (std::size_t k = 0; k < template_m.size(); ++k) {
     fit.squares_m2 += (measured_m[k] - fit.pose.rotation * template_m[k] - fit.pose.position).squaredNorm();

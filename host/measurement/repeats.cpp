@@ -3,10 +3,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <numeric>
+
+#include "distributions.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -65,7 +66,7 @@ double whitened_squares(const std::vector<Observation>& rows, const std::vector<
     information += w.transpose() * w;
     sum += w.transpose() * (w * e[i].head(n));
   }
-  const Eigen::VectorXd mean = information.llt().solve(sum);
+  const Eigen::VectorXd mean = Llt(information).solve(sum);
   double squares = 0;
   for (std::size_t i = 0; i < group.size(); ++i) {
     squares += (rows[group[i]].whitening.topLeftCorner(n, n) * (e[i].head(n) - mean)).squaredNorm();
@@ -95,10 +96,9 @@ class SquaresOfAxes {
   double sigma(double squares, Interval& interval) const {
     if (!(free_rows_ > 0)) return 0;
     const double dof = mean_ * mean_ / variance_;
-    const boost::math::chi_squared chi2(dof);
     const double variance = squares / (3 * free_rows_);
-    interval.low = std::sqrt(variance * dof / boost::math::quantile(chi2, 0.975));
-    interval.high = std::sqrt(variance * dof / boost::math::quantile(chi2, 0.025));
+    interval.low = std::sqrt(variance * dof / chi2_quantile(0.975, dof));
+    interval.high = std::sqrt(variance * dof / chi2_quantile(0.025, dof));
     return std::sqrt(variance);
   }
 
@@ -179,8 +179,7 @@ std::optional<PureError> pure_error(const std::vector<Observation>& rows, double
   const double lacking = fit_dof - out.dof;
   if (lacking > 0 && whitened > 0) {
     out.lack_of_fit_f = std::max(fit_chi2 - whitened, 0.0) / lacking / out.chi2_per_dof_whitened;
-    out.lack_of_fit_p = boost::math::cdf(
-        boost::math::complement(boost::math::fisher_f(lacking, out.dof), *out.lack_of_fit_f));
+    out.lack_of_fit_p = fisher_f_above(*out.lack_of_fit_f, lacking, out.dof);
   }
   return out;
 }

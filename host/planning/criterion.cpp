@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "planning/criterion.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <cmath>
+
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -12,15 +12,11 @@ namespace {
 /// Rounding of an update is about 1e-16 times the condition of M, and adds up.
 constexpr int updates_per_refresh = 32;
 
-double log_det_of(const Eigen::LLT<Eigen::MatrixXd>& llt) {
-  return 2 * llt.matrixLLT().diagonal().array().log().sum();
-}
-
 /// Where a pose takes nearly all that is known of some direction with it, or brings it, the inverse changes by orders of
 /// magnitude and an update keeps few digits: then from scratch.
-bool loses_digits(const Eigen::LLT<Eigen::MatrixXd>& llt) {
-  const auto diagonal = llt.matrixLLT().diagonal();
-  return llt.info() != Eigen::Success || diagonal.minCoeff() < 1e-2 || diagonal.maxCoeff() > 1e2;
+bool loses_digits(const Llt& llt) {
+  const Eigen::VectorXd diagonal = llt.diagonal();
+  return !llt.is_positive_definite() || diagonal.minCoeff() < 1e-2 || diagonal.maxCoeff() > 1e2;
 }
 
 /// log det of G = 1 + a, and tr(G⁻¹ s), for symmetric a and s.
@@ -91,14 +87,14 @@ void Information::assign(const Eigen::MatrixXd& m) {
 void Information::refresh() {
   updates_ = 0;
   const Eigen::Index f = nuisance();
-  const Eigen::LLT<Eigen::MatrixXd> llt(m_);
-  v_ = llt.solve(Eigen::MatrixXd::Identity(unknowns(), unknowns()));
+  const Llt llt(m_);
+  v_ = llt.inverse();
   figures_.trace = v_.diagonal().tail(parameters()).sum();
-  figures_.log_det = log_det_of(llt);
+  figures_.log_det = llt.log_det();
   if (f > 0) {
-    const Eigen::LLT<Eigen::MatrixXd> own(m_.topLeftCorner(f, f));
-    v_nuisance_ = own.solve(Eigen::MatrixXd::Identity(f, f));
-    figures_.log_det -= log_det_of(own);
+    const Llt own(m_.topLeftCorner(f, f));
+    v_nuisance_ = own.inverse();
+    figures_.log_det -= own.log_det();
   }
 }
 
@@ -108,20 +104,19 @@ void Information::update(const Block& h, double sign) {
   const Eigen::Index r = h.cols();
   const Block vh = v_ * h;
   const Eigen::MatrixXd g = Eigen::MatrixXd::Identity(r, r) + sign * h.transpose() * vh;
-  const Eigen::LLT<Eigen::MatrixXd> llt(g);
+  const Llt llt(g);
   if (loses_digits(llt)) return refresh();
-  v_.noalias() -= sign * vh * llt.solve(vh.transpose());
+  v_.noalias() -= sign * vh * llt.solve(Eigen::MatrixXd(vh.transpose()));
   figures_.trace = v_.diagonal().tail(parameters()).sum();
-  figures_.log_det += log_det_of(llt);
+  figures_.log_det += llt.log_det();
   const Eigen::Index f = nuisance();
   if (f == 0) return;
   const Eigen::MatrixXd own = h.topRows(f);
   const Eigen::MatrixXd own_vh = v_nuisance_ * own;
-  const Eigen::LLT<Eigen::MatrixXd> own_llt(Eigen::MatrixXd::Identity(r, r) +
-                                            sign * own.transpose() * own_vh);
+  const Llt own_llt(Eigen::MatrixXd::Identity(r, r) + sign * own.transpose() * own_vh);
   if (loses_digits(own_llt)) return refresh();
-  v_nuisance_.noalias() -= sign * own_vh * own_llt.solve(own_vh.transpose());
-  figures_.log_det -= log_det_of(own_llt);
+  v_nuisance_.noalias() -= sign * own_vh * own_llt.solve(Eigen::MatrixXd(own_vh.transpose()));
+  figures_.log_det -= own_llt.log_det();
 }
 
 template <int R, class H, class VH>
@@ -207,8 +202,7 @@ ExactFigures exact_figures(const std::vector<Block>& blocks, Eigen::Index nuisan
     rows += b.cols();
   }
   // Columns in their order, frames first: the lower right corner of R is that of the Schur complement.
-  const Eigen::MatrixXd r =
-      Eigen::HouseholderQR<Eigen::MatrixXd>(h).matrixQR().topRows(unknowns).triangularView<Eigen::Upper>();
+  const Eigen::MatrixXd r = upper_factor(h);
   const Eigen::Index p = unknowns - nuisance;
   for (Eigen::Index c = 0; c < unknowns; ++c) {
     if (!(std::abs(r(c, c)) > 1e-10 * h.col(c).norm())) return out;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -25,10 +26,9 @@ std::optional<std::vector<RowResidual>> left_out(const Identification& r, const 
   Eigen::MatrixXd weighted = lin.derivative;
   for (std::size_t k = 0; k < rows.size(); ++k)
     weighted.middleRows<6>(static_cast<Eigen::Index>(6 * k)) *= std::sqrt(r.fit.weight[k]);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(weighted);
   const Eigen::Index n = weighted.cols();
   if (weighted.rows() < n) return std::nullopt;
-  const Eigen::MatrixXd upper = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  const Eigen::MatrixXd upper = upper_factor(weighted);
   if (!(upper.diagonal().cwiseAbs().minCoeff() > 0)) return std::nullopt;
   // Rows of this are orthonormal over all: H_ii = A_i A_i^T.
   const Eigen::MatrixXd a =
@@ -39,11 +39,10 @@ std::optional<std::vector<RowResidual>> left_out(const Identification& r, const 
     const auto at = static_cast<Eigen::Index>(6 * k);
     const Eigen::MatrixXd block = a.middleRows(at, size);
     const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(size, size) - block * block.transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(rest);
-    if (!(solver.eigenvalues()[0] > least_left)) return std::nullopt;
-    const Eigen::VectorXd whitened = solver.eigenvectors() *
-                                     solver.eigenvalues().cwiseInverse().asDiagonal() *
-                                     solver.eigenvectors().transpose() * lin.residual.segment(at, size);
+    const SymmetricEigen eigen = symmetric_eigen(rest);
+    if (!(eigen.values[0] > least_left)) return std::nullopt;
+    const Eigen::VectorXd whitened = eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
+                                     eigen.vectors.transpose() * lin.residual.segment(at, size);
     const Eigen::VectorXd e = rows[k].whitening.topLeftCorner(size, size).lu().solve(whitened);
     out[k].position_m = e.head<3>();
     if (size == 6) out[k].orientation_rad = e.tail<3>();

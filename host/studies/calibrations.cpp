@@ -15,6 +15,7 @@
 #include "identification/estimator.hpp"
 #include "identification/identifiability.hpp"
 #include "identification/parameter_selection.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -39,8 +40,7 @@ double expected_score(double relative_sigma) {
 
 /// The smallest of all solutions that are best.
 Eigen::VectorXd smallest_solution(const Linearised& lin) {
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr(lin.derivative);
-  return qr.solve(lin.residual);
+  return shortest_least_squares(lin.derivative, lin.residual);
 }
 
 }  // namespace
@@ -168,7 +168,7 @@ Eigen::MatrixXd Experiment::cramer_rao() const {
   const Eigen::MatrixXd j = linearised(at_truth_, *model, clean_, there).derivative;
   const Eigen::VectorXd units = units_of(there, at_truth_.set);
   const Eigen::MatrixXd information = j.transpose() * j;
-  const Eigen::MatrixXd covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
+  const Eigen::MatrixXd covariance = Ldlt(information).inverse();
   return units.asDiagonal() * covariance * units.asDiagonal();
 }
 

@@ -36,14 +36,7 @@ loop() {
   fi
   tail -n 4 "$folder"/log
   /usr/bin/python3 "$here"/emulators/closed_loop.py "$folder"/closed_loop.json || failed=1
-  /usr/bin/python3 - "$folder"/diagnosis.json "$of" <<'PYTHON' || { cat "$folder"/log; failed=1; }
-import json, sys
-found = json.load(open(sys.argv[1]))["effects"]
-wanted = json.loads(sys.argv[2])
-fine = len(found) == 1 and all(found[0].get(key) == value for key, value in wanted.items())
-print("ok:" if fine else "FAILED:", "named", [{k: e.get(k) for k in wanted} for e in found])
-sys.exit(not fine)
-PYTHON
+  /usr/bin/python3 "$here"/named_effect.py "$folder"/diagnosis.json "$of" || { cat "$folder"/log; failed=1; }
   # The set that runs now is longer than the first, and both went to one controller.
   grep -q 'set 1 is active' "$folder"/log && grep -q 'set 2 is active' "$folder"/log ||
     { echo "FAILED: not two sets in one controller"; failed=1; }

@@ -37,14 +37,9 @@ absent() {
 }
 diagnose() { "$flexcomp" diagnose --robot "$robot" "$@"; }
 simulate() { "$flexcomp" simulate --robot "$robot" --quiet --noise N1 "$@"; }
-# judge WHAT FILE… <<<PYTHON   j is the first file's JSON, k the second's
+# judge CASE FILE…
 judge() {
-  local what=$1
-  shift
-  { echo 'import json, sys'
-    echo 'j, k = (json.load(open(f)) for f in (sys.argv[1:] * 2)[:2])'
-    cat; } >judge.py
-  if /usr/bin/python3 judge.py "$@"; then echo "ok: $what"; else fail "$what: $(head -c 3000 "$1")"; fi
+  if /usr/bin/python3 "$root"/tests/host/commands/diagnose_answers.py "$@"; then echo "ok: $1"; else fail "$1: $(head -c 3000 "$2")"; fi
 }
 
 without() { # without PATTERN: columns whose names match are left out of the file on standard input
@@ -64,48 +59,21 @@ simulate --truth harmonic.yaml --poses 60 --seed 4 --context --payloads 0,1.108 
 expect 0 "joint 3 has an error that comes twice per turn" "gear_harmonic[joint=3,order=2]" "arcsec" "held-out rows" \
   "a.yaml: written" "r.html: written" "flexcomp push --to BUS a.yaml" -- \
   diagnose --data d.csv --holdout h.csv -o a.yaml --json a.json --report r.html --seed 5
-judge "named, and nothing else" a.json <<'PYTHON'
-assert j["verdict"] == "named", j["verdict"]
-(e,) = j["effects"]
-assert (e["effect"], e["joint"], e["order"]) == ("gear_harmonic", 3, 2), e
-for key, true in (("sin_rad", 3e-4), ("cos_rad", 1e-4)):
-    assert abs(e["coefficients"][key] - true) < 5 * e["sigma"][key], key
-    assert 0 < e["sigma"][key] < 3e-5, key
-assert e["pushed"] is True and e["p_value"] < 0.01 and e["delta_bic"] > 10
-assert isinstance(e["confounded_with"], list)
-where = j["where"]
-assert where["place"].startswith("link3.") and where["joint"] == 3 and "q3" in where["covariates"], where
-assert len(where["around_deg"]) == len(where["covariates"]) and 0 < where["explains"] <= 1
-PYTHON
-judge "the gap shrinks where nothing was fitted" a.json <<'PYTHON'
-g = j["gap"]
-assert abs(g["noise_floor_mm"] - 3 ** 0.5 * 0.035) < 1e-9, g
-for rms in ("train_rms_mm", "holdout_rms_mm"):
-    left = [max(0, g[w][rms] ** 2 - g["noise_floor_mm"] ** 2) for w in ("before", "after")]
-    assert left[1] < 0.2 * left[0], (rms, g)
-assert g["after"]["holdout_rms_deg"] < g["before"]["holdout_rms_deg"]
-PYTHON
+judge named_and_nothing_else a.json
+judge the_gap_shrinks_where_nothing_was_fitted a.json
 grep -q '<svg' r.html || fail "no drawing in r.html"
-# The script that the page carries is looked at by tests/report.
+# The script that the page carries is looked at by tests/host/report.
 sed '/<script>/,/<\/script>/d' r.html | grep -Eq '<link|<img|(src|href)=.?(https?:)?//|url\(' && fail "r.html needs something from elsewhere"
 
 # --- held-out rows change the held-out numbers alone; one seed, one result ------------------------------------------------
 expect 0 -- diagnose --data d.csv -o b.yaml --json b.json --seed 5 --quiet
 [[ ! -s said.txt ]] || fail "--quiet: $(cat said.txt)"
-judge "the same without --holdout" a.json b.json <<'PYTHON'
-for w in ("before", "after"):
-    for rms in ("holdout_rms_mm", "holdout_rms_deg"):
-        assert k["gap"][w].pop(rms) is None and j["gap"][w].pop(rms) is not None
-for g in (j["gap"], k["gap"]): g.pop("holdout_noise_floor_mm", None)
-assert json.dumps(j) == json.dumps(k)
-PYTHON
+judge the_same_without_holdout a.json b.json
 diff <(grep -v '^date:' a.yaml) <(grep -v '^date:' b.yaml) || fail "--holdout changes the calibration"
 
 # What was written is a calibration like any other.
 expect 0 "chi-square" -- "$flexcomp" validate --robot "$robot" --calibration a.yaml --data h.csv --json v.json
-judge "and validates to the numbers that were promised" a.json v.json <<'PYTHON'
-assert abs(j["gap"]["after"]["holdout_rms_mm"] - k["after"]["rms_mm"]) < 1e-9
-PYTHON
+judge and_validates_to_the_numbers_that_were_promised a.json v.json
 expect 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration a.yaml --targets h.csv -o c.csv
 
 # --- nothing hidden; from a calibration; nothing to tell apart ------------------------------------------------------------
@@ -114,10 +82,7 @@ simulate --truth "$root"/tests/data/tx60l_table1.yaml --poses 100 --seed 3 --con
 expect 0 "Nothing is missing" "poses.csv: not written" -- \
   diagnose --calibration start.yaml --data plain.csv -o n.yaml --json n.json --plan poses.csv
 absent poses.csv
-judge "none" n.json <<'PYTHON'
-assert j["verdict"] == "none" and j["effects"] == []
-assert j["gap"]["before"]["holdout_rms_mm"] is None
-PYTHON
+judge none n.json
 
 # --- too few rows: what fits as well as it must proves nothing ------------------------------------------------------------
 head -n 4 plain.csv >three.csv
@@ -129,13 +94,7 @@ grep -q "Nothing is missing" t.html && fail "t.html: three rows are said to show
 without '^(move|temp|time)' <plain.csv >bare.csv
 head -1 bare.csv | grep -q 'move\|temp' && fail "bare.csv has context"
 expect 0 "not tested: readout_lag needs move1_deg … move6_deg" -- diagnose --data bare.csv -o m.yaml --json m.json
-judge "not_testable names the columns" m.json <<'PYTHON'
-needs = {n["effect"]: n["needs"] for n in j["not_testable"]}
-assert needs["readout_lag"] == ["move%d_deg" % i for i in range(1, 7)], needs
-assert "backlash" in needs and any(c.startswith(("dir", "move")) for c in needs["backlash"]), needs
-assert "temp_c" in needs["thermal_growth"] and "time_s" in needs["base_drift"], needs
-assert "gear_harmonic" not in needs
-PYTHON
+judge not_testable_names_the_columns m.json
 
 # --- two names for one thing: said, and poses that tell them apart ----------------------------------------------------------
 # Joint 3 near 0 only: there a wrong scale and a slow wave look alike.
@@ -143,13 +102,7 @@ hidden '{effect: encoder_scale, joint: 3, gain: 1.0e-3}' >scale.yaml
 awk -F, -v OFS=, 'NR > 1 { $3 = $3 / 4 } 1' d.csv | without '^([xyz]_mm|q[wxyz]|sigma)' >narrow_q.csv
 simulate --truth scale.yaml --joints narrow_q.csv --seed 6 -o narrow.csv
 expect 0 -- diagnose --data narrow.csv -o s.yaml --json s.json --plan tell.csv
-judge "every effect is joint 3's, and rivals are named" s.json <<'PYTHON'
-assert j["verdict"] == "named", j["verdict"]
-assert all(e["joint"] == 3 for e in j["effects"]), j["effects"]
-assert {"effect", "joint", "delta_bic"} <= set(j["effects"][0]["confounded_with"][0])
-assert any("encoder_scale" in (e["effect"], *(r["effect"] for r in e["confounded_with"])) for e in j["effects"])
-assert len(j["telling_deg"]) == len(j["telling_payload_kg"]) > 0
-PYTHON
+judge every_effect_is_joint_3_s_and_rivals_are_named s.json
 [[ "$(head -1 tell.csv)" = q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg ]] || fail "tell.csv: $(head -1 tell.csv)"
 grep -qF "tell.csv: " said.txt || fail "nothing is said of tell.csv"
 expect 0 "poses of tell.csv" -- "$flexcomp" simulate --robot "$robot" --truth scale.yaml --joints tell.csv -o told.csv
@@ -161,15 +114,7 @@ simulate --truth cable.yaml --poses 150 --seed 3 --context --payloads 0,1.108 -o
 simulate --truth cable.yaml --poses 60 --seed 4 --context --payloads 0,1.108 -o cable_h.csv
 expect 0 "no effect of the catalogue explains" "link3.theta, joint 3 moves wrongly" "--allow-unnamed" -- \
   diagnose --data cable.csv --holdout cable_h.csv -o k.yaml --json k.json --report k.html
-judge "unnamed, where it is and what it follows" k.json <<'PYTHON'
-assert j["verdict"] == "unnamed", j["verdict"]
-w = j["where"]
-assert (w["place"], w["joint"], set(w["covariates"])) == ("link3.theta", 3, {"q2", "payload_kg"}), w
-assert "unnamed" not in [e["effect"] for e in j["effects"]] and j["unnamed"], j["unnamed"]
-g = j["gap"]
-left = [max(0, g[when]["holdout_rms_mm"] ** 2 - g["noise_floor_mm"] ** 2) for when in ("before", "after")]
-assert left[1] < 0.5 * left[0], g
-PYTHON
+judge unnamed_where_it_is_and_what_it_follows k.json
 expect 3 "--allow-unnamed" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv
 absent kc.csv
 expect 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv --allow-unnamed

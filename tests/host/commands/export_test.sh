@@ -61,26 +61,7 @@ expect 0 "link_gravity" --as urdf --robot "$robots/tx60l.yaml" --calibration "$d
 grep -q '"largest_mm"' urdf.json || fail "$(cat urdf.json)"
 expect 0 "electronic data sheet" --as eds -o flexcomp.eds
 for ending in csv json md; do expect 0 "register map" --as modbus -o "map.$ending"; done
-/usr/bin/python3 - <<'PYTHON' || fail "the data sheet or the map is not read by others"
-import configparser, csv, json
-eds = configparser.RawConfigParser(strict=True)
-eds.optionxform = str
-eds.read("flexcomp.eds")
-listed = [eds[s][str(k)] for s in ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
-          for k in range(1, int(eds[s]["SupportedObjects"]) + 1)]
-assert len(listed) == len(set(listed)) >= 14, listed
-for index in listed:
-    section = eds[index[2:]]
-    assert section["ParameterName"] and int(section["ObjectType"], 0) in (2, 7, 9), index
-    if int(section["ObjectType"], 0) == 9:
-        subs = [s for s in eds.sections() if s.startswith(index[2:] + "sub")]
-        assert len(subs) == int(section["SubNumber"]), index
-assert eds["FileInfo"]["FileName"] == "flexcomp.eds" and eds["1018sub2"]["DefaultValue"] == "0x464C5831"
-rows = list(csv.DictReader(open("map.csv")))
-other = json.load(open("map.json"))["registers"]
-assert [(int(r["address"]), r["name"], r["type"]) for r in rows] == [(r["address"], r["name"], r["type"]) for r in other]
-assert sum(r["name"] == "command" and r["access"] == "rw" for r in rows) == 1
-PYTHON
+/usr/bin/python3 "$FLEXCOMP_SOURCE_DIR"/tests/host/commands/read_exports.py || fail "the data sheet or the map is not read by others"
 
 [ "$failures" -eq 0 ] && echo "headers of $(ls "$robots"/*.yaml | wc -l) robots"
 [ "$failures" -eq 0 ]

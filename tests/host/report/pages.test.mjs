@@ -9,8 +9,8 @@ import {readFileSync, statSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
-import {chain, measuredPoint, toolFrame} from '../../host/report/web/src/chain.js';
-import {jointsOf, lengthText, norm, readData, shown, tickText} from '../../host/report/web/src/data.js';
+import {chain, measuredPoint, toolFrame} from '../../../host/report/web/src/chain.js';
+import {jointsOf, lengthText, norm, readData, shown, tickText} from '../../../host/report/web/src/data.js';
 import {launch, marks, open, picture, settled} from './browser.mjs';
 
 const source = process.env.FLEXCOMP_SOURCE_DIR;

@@ -1,15 +1,12 @@
-#!/usr/bin/env bash
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# The command line teaches and is careful: every example of every --help runs as it stands there; push --dry-run shows what
-# would change and leaves the controller untouched; completion, colours, hints and bars behave on a terminal and in a pipe.
-set -uo pipefail
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-export PATH=${FLEXCOMP_BIN_DIR:?}:$PATH
-/usr/bin/python3 - "${FLEXCOMP_SOURCE_DIR:?}" <<'PYTHON'
-import csv, json, math, os, pty, re, select, shutil, signal, socket, subprocess, sys, time
-root = sys.argv[1]
+"""The command line teaches and is careful: every example of every --help runs as it stands there; push --dry-run shows what
+would change and leaves the controller untouched; completion, colours, hints and bars behave on a terminal and in a pipe."""
+import csv, json, math, os, pty, re, select, shutil, signal, socket, subprocess, sys, tempfile, time
+work = tempfile.TemporaryDirectory()
+os.chdir(work.name)
+root = os.environ["FLEXCOMP_SOURCE_DIR"]
+os.environ["PATH"] = os.environ["FLEXCOMP_BIN_DIR"] + ":" + os.environ["PATH"]
 failures = 0
 
 def fail(*words):
@@ -277,4 +274,3 @@ for wrong, right in (("tx60.yaml", "tx60l.yaml"), ("tx60l.yml", "tx60l.yaml"), (
     if code != 3 or "there is " + right not in warned: fail(wrong, code, warned)
 print(failures, "failures")
 sys.exit(failures != 0)
-PYTHON

@@ -1,18 +1,13 @@
-#!/usr/bin/env bash
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# docs/tutorial.md word for word: every command of it in order, each must print what stands there, and every figure of the
-# text in mm must be one of those that were printed. What it makes stays in build/…/tutorial; docs/pictures/make draws that.
-set -euo pipefail
-source=${FLEXCOMP_SOURCE_DIR:?} bin=${FLEXCOMP_BIN_DIR:?}
-work=$(dirname -- "$bin")/tutorial
-rm -rf -- "$work"
-mkdir -p -- "$work/build/host"
-cd -- "$work"
-ln -s "$source/host" "$source/hil" "$source/tests" "$source/docs" .
-ln -s "$bin" build/host/bin
-PYTHONPATH=$source/tests/hil PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - "$source" <<'PYTHON'
-import glob, re, shown, sys
-root = sys.argv[1]
+"""docs/tutorial.md word for word: every command of it in order, each must print what stands there, and every figure of the
+text in mm must be one of those that were printed. What it makes stays in build/…/tutorial; docs/pictures/make draws that."""
+import glob, os, re, shown, shutil, sys
+root, programs = os.environ["FLEXCOMP_SOURCE_DIR"], os.environ["FLEXCOMP_BIN_DIR"]
+work = os.path.join(os.path.dirname(programs), "tutorial")
+shutil.rmtree(work, ignore_errors=True)
+os.makedirs(work)
+shown.stand_in(work, root, programs)
 text = open(root + "/docs/tutorial.md", encoding="utf-8").read()
 failed, printed = shown.run(text, least=15)
 
@@ -28,4 +23,3 @@ for figure, decimals in figures:
         print("FAILED: %s is in the text and was not printed" % figure)
 failed |= shown.links(text, root + "/docs")
 sys.exit(failed)
-PYTHON

@@ -1,14 +1,11 @@
-#!/usr/bin/env bash
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# flexcomp compensate on programs of robot makers: what stands in a KUKA, ABB or Stäubli program comes out as what the plain
-# CSV of the same targets gives, on the branch that the target names, and every other byte stays.
-set -uo pipefail
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-/usr/bin/python3 - "${FLEXCOMP_BIN_DIR:?}/flexcomp" "${FLEXCOMP_SOURCE_DIR:?}" <<'PYTHON'
-import csv, json, math, os, random, re, subprocess, sys
-flexcomp, root = sys.argv[1:]
+"""flexcomp compensate on programs of robot makers: what stands in a KUKA, ABB or Stäubli program comes out as what the plain
+CSV of the same targets gives, on the branch that the target names, and every other byte stays."""
+import csv, json, math, os, random, re, subprocess, sys, tempfile
+work = tempfile.TemporaryDirectory()
+os.chdir(work.name)
+flexcomp, root = os.environ["FLEXCOMP_BIN_DIR"] + "/flexcomp", os.environ["FLEXCOMP_SOURCE_DIR"]
 failures = 0
 
 def run(*arguments):
@@ -263,4 +260,3 @@ done(*base, "--targets", "x.txt", "--format", "val3", "-o", "x_out.txt", "--quie
 if read("x_out.txt") != after: fail("--format")
 print(failures, "failures")
 sys.exit(failures != 0)
-PYTHON

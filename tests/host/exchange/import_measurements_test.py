@@ -1,15 +1,12 @@
-#!/usr/bin/env bash
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# flexcomp import of instruments' exports: the same measured data in the dress of SpatialAnalyzer, PolyWorks, a spreadsheet
-# with decimal commas, metres, inches, radians, other signs and zeros, clocks … becomes the same data file again; what is
-# ambiguous, undeclared or contradictory is refused with file, line and field.
-set -uo pipefail
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-/usr/bin/python3 - "${FLEXCOMP_BIN_DIR:?}/flexcomp" "${FLEXCOMP_SOURCE_DIR:?}" <<'PYTHON'
-import csv, json, math, os, random, re, subprocess, sys
-flexcomp, root = sys.argv[1:]
+"""flexcomp import of instruments' exports: the same measured data in the dress of SpatialAnalyzer, PolyWorks, a spreadsheet
+with decimal commas, metres, inches, radians, other signs and zeros, clocks … becomes the same data file again; what is
+ambiguous, undeclared or contradictory is refused with file, line and field."""
+import csv, json, math, os, random, re, subprocess, sys, tempfile
+work = tempfile.TemporaryDirectory()
+os.chdir(work.name)
+flexcomp, root = os.environ["FLEXCOMP_BIN_DIR"] + "/flexcomp", os.environ["FLEXCOMP_SOURCE_DIR"]
 robot = root + "/host/robots/tx60l.yaml"
 truth = root + "/tests/data/tx60l_table1.yaml"
 failures = 0
@@ -580,4 +577,3 @@ print(taken, "of 150 broken exports were still read")
 if not 5 < taken < 145: fail("broken exports:", taken)
 print(failures, "failures")
 sys.exit(failures != 0)
-PYTHON

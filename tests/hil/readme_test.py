@@ -1,17 +1,10 @@
-#!/usr/bin/env bash
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# What README.md shows is true: its commands are run and must print what stands there, its code compiles.
-set -euo pipefail
-source=${FLEXCOMP_SOURCE_DIR:?} bin=${FLEXCOMP_BIN_DIR:?}
-work=$(mktemp -d)
-trap 'rm -rf -- "$work"' EXIT
-cd -- "$work"
-ln -s "$source/host" "$source/hil" "$source/tests" "$source/docs" .
-mkdir -p build/host
-ln -s "$bin" build/host/bin
-PYTHONPATH=$source/tests/hil PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 - "$source" <<'PYTHON'
-import re, shown, subprocess, sys
-root = sys.argv[1]
+"""What README.md shows is true: its commands are run and must print what stands there, its code compiles."""
+import os, re, shown, subprocess, sys, tempfile
+root, programs = os.environ["FLEXCOMP_SOURCE_DIR"], os.environ["FLEXCOMP_BIN_DIR"]
+work = tempfile.TemporaryDirectory()
+shown.stand_in(work.name, root, programs)
 text = open(root + "/README.md", encoding="utf-8").read()
 failed, _ = shown.run(text, least=5)
 
@@ -25,4 +18,3 @@ for mark, language, compiler in (("c", "c", ["gcc", "-std=c99"]), ("c++", "cpp",
     print("ok:" if run.returncode == 0 else "FAILED:", "the example in", mark)
 failed |= shown.links(text, root)
 sys.exit(failed)
-PYTHON

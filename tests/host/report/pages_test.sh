@@ -17,7 +17,7 @@ if ! cmp -s "$here/package-lock.json" "$work/package-lock.json" || [ ! -e "$work
   rm -f "$work/installed"
   cp "$here/package.json" "$here/package-lock.json" "$work" || exit 1
   (cd "$work" && npm ci --ignore-scripts --no-audit --no-fund --prefer-offline --loglevel=error) ||
-    { echo "npm could not install what tests/report/package-lock.json names; it needs the npm registry once"; exit 1; }
+    { echo "npm could not install what tests/host/report/package-lock.json names; it needs the npm registry once"; exit 1; }
   touch "$work/installed"
 fi
 # The pages and their pictures stay there to be looked at.
