@@ -388,7 +388,7 @@ std::string limits_of_the_data(const Page& page) {
         "<section><h2>Missing in these data</h2>\n<p>Other poses of the same kind would know them: {}.</p>\n",
         joined(page.missing));
     if (!page.cure_rad.empty()) {
-      out += "<p>Poses that would cure it, best first:</p>" + poses_table(page.cure_rad, {}, 1);
+      out += "<p>Poses that would identify them, best first:</p>" + poses_table(page.cure_rad, {}, 1);
     }
     out += "</section>\n";
   }

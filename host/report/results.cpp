@@ -173,7 +173,7 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   p.facts = {{"data", data},
              {"poses", fmt::format("{}", rows.size())},
              {"parameters identifiable", fmt::format("{} of {}", r.identifiable, r.parameters)},
-             {"numbers of the frames", fmt::format("{}", r.frame_parameters)},
+             {"frame parameters", fmt::format("{}", r.frame_parameters)},
              {"chi-square per degree of freedom",
               r.fit.degrees_of_freedom > 0 ? fmt::format("{:.3g}", r.fit.chi2_per_dof()) : "–"},
              {"condition", fmt::format("{:.3g}", r.condition)},
@@ -189,8 +189,8 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   p.poses.push_back(set);
   if (!compared.empty()) p.further.push_back(models_section(compared, without_priors));
   add_parameters(p, r.calibration, robot);
-  p.missing = r.known.missing;
-  for (const SuggestedPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
+  p.missing = r.identifiability.missing;
+  for (const SuggestedPose& c : r.identifiability.suggested_poses) p.cure_rad.push_back(c.q_rad);
   return p;
 }
 

@@ -80,7 +80,7 @@ expect 3 "radians.csv" "radians" -- identify radians.csv
 
 # --- too few poses, one orientation: done, but not to be trusted; what is missing and what cures it ---
 head -5 good.csv >few.csv
-expect 5 "cannot know" "would cure it" -- identify few.csv
+expect 5 "not identifiable" "would identify them" -- identify few.csv
 python3 - "$robot" <<'PYTHON' || exit 1
 # Poses of one orientation: joint 1 turns by d and joint 6 against it, with the wrist axis upright (q2 + q3 + q5 = 180:
 # joint 6 parallel to joint 1).
@@ -96,7 +96,7 @@ for k in range(40):
 open("upright.csv", "w").write("\n".join(rows) + "\n")
 PYTHON
 expect 0 -- "$flexcomp" predict --robot "$robot" --calibration "$truth" --joints upright.csv -o settled.csv --quiet
-expect 5 "cannot know" "would cure it" -- identify settled.csv
+expect 5 "not identifiable" "would identify them" -- identify settled.csv
 
 # --- two identical rows ---
 { cat good.csv; sed -n 9p good.csv; } >twice.csv
