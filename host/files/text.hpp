@@ -16,13 +16,13 @@ struct TextSpan {
   std::size_t end = 0;
 };
 
-/// Without blanks and tabs at both ends.
+/// Removes blanks and tabs at both ends.
 std::string_view trimmed(std::string_view text);
 
-/// ASCII letters in lower case; other bytes as they are.
+/// Converts ASCII letters to lower case; other bytes stay.
 std::string lower(std::string_view text);
 
-/// Where the > of a tag of XML stands, looked for from `at` on and not within quotes; npos where there is none.
+/// Position of the > that ends an XML tag, from `at` on and outside quotes; npos where there is none.
 std::size_t tag_close(std::string_view text, std::size_t at);
 
 }  // namespace flexcomp::host
