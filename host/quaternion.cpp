@@ -34,4 +34,9 @@ Eigen::Quaterniond unit_quaternion(const Eigen::Matrix3d& rotation) {
   return upper_half(Eigen::Quaterniond(rotation).normalized());
 }
 
+Eigen::Vector3d rotation_between(const Eigen::Matrix3d& to, const Eigen::Matrix3d& from) {
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(to * from.transpose()));
+  return turn.angle() * turn.axis();
+}
+
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Quaternions of files: Hamilton, w x y z.
+/// Quaternions of files (Hamilton, w x y z) and rotation vectors.
 #ifndef FLEXCOMP_HOST_QUATERNION_HPP
 #define FLEXCOMP_HOST_QUATERNION_HPP
 
@@ -16,6 +16,9 @@ std::optional<Eigen::Quaterniond> unit_quaternion(const std::array<double, 4>& w
 
 /// Of a rotation matrix, norm 1, w >= 0.
 Eigen::Quaterniond unit_quaternion(const Eigen::Matrix3d& rotation);
+
+/// Rotation vector log(to fromᵀ), rad, in the outer frame.
+Eigen::Vector3d rotation_between(const Eigen::Matrix3d& to, const Eigen::Matrix3d& from);
 
 }  // namespace flexcomp::host
 

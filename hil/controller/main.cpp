@@ -74,7 +74,7 @@ std::uint32_t number(const std::string& option, const std::string& text, std::ui
   return v;
 }
 
-/// The host's addresses, and PORT 0 besides: a free port, which the `ready` line names.
+/// Parses a Modbus TCP address, also with PORT 0: a free port, which the `ready` line names.
 host::ModbusTcpAddress tcp_address(const std::string& text) {
   const std::size_t bracket = text.starts_with('[') ? text.find(']') : 0;
   const std::size_t colon = bracket == std::string::npos ? bracket : text.find(':', bracket);
@@ -87,7 +87,7 @@ host::ModbusTcpAddress tcp_address(const std::string& text) {
   return address;
 }
 
-/// Empty where the usage was asked for.
+/// Parses the options; nothing for --help.
 std::optional<Options> parse(const std::vector<std::string>& arguments) {
   Options o;
   for (std::size_t k = 0; k < arguments.size(); ++k) {
@@ -130,9 +130,8 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
   return o;
 }
 
-/// The control cycle: the arm sways slowly about the middle of its range, so that directions turn and what
-/// the cycle publishes moves. Cycles that the machine was too busy for are left out, never made up for in a
-/// burst.
+/// Runs the control cycle: the joints oscillate slowly about the middle of their ranges, so that directions and
+/// published values change. Missed cycles are skipped, not caught up.
 void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atomic<bool>& stop) {
   const auto context = default_context<firmware::Scalar>(device.robot());
   timespec next{};
@@ -143,9 +142,9 @@ void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atom
     firmware::Joints q;
     for (std::size_t j = 0; j < firmware::joints; ++j) {
       const JointLimits& limits = device.robot().limits[j];
-      const double sway = std::sin(t * (0.3 + 0.05 * static_cast<double>(j)));
+      const double oscillation = std::sin(t * (0.3 + 0.05 * static_cast<double>(j)));
       q[j] = static_cast<firmware::Scalar>(0.5 * (limits.min_rad + limits.max_rad) +
-                                           0.05 * (limits.max_rad - limits.min_rad) * sway);
+                                           0.05 * (limits.max_rad - limits.min_rad) * oscillation);
     }
     device.step(q, context);
     timespec now{};
@@ -177,13 +176,13 @@ int serve(const Options& options) {
   if ((faults & wire::fault::storage) != 0)
     std::fprintf(stderr, "flexcomp-controller: the store cannot be read\n");
 
-  // Signals come through a descriptor, also for the threads that are started from here on.
+  // Signals are received through a descriptor, also in threads started from here on.
   sigset_t signals;
   ::sigemptyset(&signals);
   ::sigaddset(&signals, SIGTERM);
   ::sigaddset(&signals, SIGINT);
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  const hil::Descriptor signalled(::signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC));
+  const host::Descriptor signalled(::signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC));
 
   std::vector<std::unique_ptr<hil::Port>> ports;
   if (options.can)

@@ -25,8 +25,8 @@ namespace {
 
 std::string reason() { return std::strerror(errno); }
 
-/// How long a serial line is silent before it counts as back in step. Longer than the standard's 1.75 ms
-/// because a process sees bytes in bursts; much shorter than any client waits for an answer.
+/// Silence that ends a frame, Modbus over Serial Line V1.02, 2.5.1.1. Longer than the standard's 1.75 ms
+/// because a process receives bytes in bursts; much shorter than a client's response time-out.
 constexpr std::uint32_t rtu_gap_us = 50'000;
 
 constexpr std::size_t most_unsent_bytes = 65536;
@@ -49,15 +49,15 @@ std::uint32_t now_us() {
 
 namespace {
 
-Descriptor open_can(const host::CanAddress& address) {
+host::Descriptor open_can(const host::CanAddress& address) {
   const auto fail = [&address](const std::string& what) {
     throw host::BusError("can:" + address.interface + ": " + what);
   };
-  Descriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
+  host::Descriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
   if (!socket) fail("this kernel has no SocketCAN (" + reason() + "); see hil/with-vcan");
   const unsigned index = ::if_nametoindex(address.interface.c_str());
   if (index == 0) fail("no such interface");
-  // Exactly the identifiers that concern this node, 11 bits, data frames only.
+  // Only 11-bit data frames with the identifiers of this node.
   const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
   const can_filter filters[2] = {
       {wire::canopen::nmt_id, mask},
@@ -80,7 +80,7 @@ CanPort::CanPort(firmware::Device& device, firmware::Origin origin, const host::
       node_(device, origin, {address.node, heartbeat_ms, 2000}, {this, send}) {}
 
 void CanPort::wait_on(std::vector<pollfd>& descriptors) const {
-  // A socket whose interface is down would report an error for ever; serve() tries again on each turn anyway.
+  // A socket whose interface is down reports an error permanently; serve() retries in each call.
   if (!down_) descriptors.push_back({socket_.get(), POLLIN, 0});
 }
 
@@ -132,7 +132,7 @@ TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> list(found, ::freeaddrinfo);
   std::string why = "no address";
   for (const addrinfo* a = found; a != nullptr && !listener_; a = a->ai_next) {
-    Descriptor s(::socket(a->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    host::Descriptor s(::socket(a->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int on = 1;
     if (s && ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
         ::bind(s.get(), a->ai_addr, a->ai_addrlen) == 0 && ::listen(s.get(), 16) == 0) {
@@ -168,12 +168,12 @@ void TcpPort::wait_on(std::vector<pollfd>& descriptors) const {
 
 void TcpPort::accept() {
   for (;;) {
-    Descriptor s(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    host::Descriptor s(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!s) return;
     const int on = 1;
     ::setsockopt(s.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     ::setsockopt(s.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
-    // Where all are taken the one that was silent longest gives way (Messaging on TCP/IP V1.0b, 4.2.1).
+    // If all are in use, the longest idle one is closed (Modbus Messaging on TCP/IP V1.0b, 4.2.1).
     Connection* place = connections_.front().get();
     for (const auto& c : connections_) {
       if (!c->socket) {
@@ -218,7 +218,7 @@ bool TcpPort::flush(Connection& c) {
 
 void TcpPort::serve(Connection& c) {
   std::array<std::uint8_t, 2048> in;
-  // A client that does not read its answers is not read either.
+  // Requests of a client that does not read its answers stay in the socket.
   for (int k = 0; k < 16 && c.out.size() < most_unsent_bytes; ++k) {
     const ssize_t n = ::recv(c.socket.get(), in.data(), in.size(), 0);
     if (n < 0 && errno == EINTR) continue;
@@ -261,8 +261,8 @@ speed_t speed(std::uint32_t baud) {
 
 }  // namespace
 
-Descriptor RtuPort::open() const {
-  Descriptor d(::open(address_.device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+host::Descriptor RtuPort::open() const {
+  host::Descriptor d(::open(address_.device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!d) return d;
   termios t{};
   if (::tcgetattr(d.get(), &t) != 0) return {};

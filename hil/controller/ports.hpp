@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// The buses of the process: what stands between the firmware's servers and the sockets and devices of
-/// Linux. Each port is asked for the descriptors that it waits on and then serves what has come; none of them
-/// blocks.
+/// \file Bus ports: connect the firmware's servers to sockets and serial devices of Linux. A port lists the
+/// descriptors to poll and serves without blocking.
 #ifndef FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
 #define FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
 
@@ -15,7 +13,7 @@
 #include <vector>
 
 #include "bus/bus_address.hpp"
-#include "descriptor.hpp"
+#include "bus/descriptor.hpp"
 #include "flexcomp_firmware/canopen.hpp"
 #include "flexcomp_firmware/modbus.hpp"
 
@@ -30,7 +28,7 @@ class Port {
   virtual ~Port() = default;
   virtual void wait_on(std::vector<pollfd>& descriptors) const = 0;
   virtual void serve() = 0;
-  /// What the `ready` line says of it.
+  /// Address in the `ready` line.
   virtual std::string text() const = 0;
 };
 
@@ -47,12 +45,12 @@ class CanPort final : public Port {
  private:
   static bool send(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size);
   host::CanAddress address_;
-  Descriptor socket_;
+  host::Descriptor socket_;
   firmware::CanopenNode node_;
   bool down_ = false;
 };
 
-/// Modbus TCP: a listening socket and a fixed number of connections, each with a server of its own.
+/// Modbus TCP server: a listening socket and a fixed number of connections, each with its own server.
 class TcpPort final : public Port {
  public:
   /// \throws host::BusError  the address cannot be resolved or listened on
@@ -66,11 +64,11 @@ class TcpPort final : public Port {
  private:
   struct Connection {
     Connection(firmware::Device& device, firmware::Origin origin) : server(device, origin) {}
-    Descriptor socket;
+    host::Descriptor socket;
     firmware::ModbusServer server;
     std::unique_ptr<firmware::ModbusTcp> stream;
-    std::vector<std::uint8_t> out;  ///< what the socket did not take yet
-    std::uint64_t used = 0;         ///< when something came last, in requests of the port
+    std::vector<std::uint8_t> out;  ///< bytes not yet sent
+    std::uint64_t used = 0;         ///< time of the last data, in requests of the port
   };
   static void send(void* connection, const std::uint8_t* bytes, std::size_t size);
   static bool flush(Connection& c);
@@ -79,13 +77,12 @@ class TcpPort final : public Port {
   void serve(Connection& c);
 
   host::ModbusTcpAddress address_;
-  Descriptor listener_;
+  host::Descriptor listener_;
   std::vector<std::unique_ptr<Connection>> connections_;
   std::uint64_t clock_ = 0;
 };
 
-/// Modbus RTU on a serial device. A device that goes away (an unplugged adapter) is opened again when it is
-/// back.
+/// Modbus RTU server on a serial device. A device that disappears (an unplugged adapter) is reopened.
 class RtuPort final : public Port {
  public:
   /// \throws host::BusError  no such device, not a serial device, or a baud rate that it does not have
@@ -96,9 +93,9 @@ class RtuPort final : public Port {
 
  private:
   static void send(void* self, const std::uint8_t* bytes, std::size_t size);
-  Descriptor open() const;
+  host::Descriptor open() const;
   host::ModbusRtuAddress address_;
-  Descriptor device_;
+  host::Descriptor device_;
   firmware::ModbusServer server_;
   firmware::ModbusRtu line_;
   std::uint32_t closed_ms_ = 0;

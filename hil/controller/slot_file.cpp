@@ -34,7 +34,7 @@ SlotFile::SlotFile(const std::string& path)
   if (!S_ISREG(info.st_mode)) refuse("a regular file", "something else");
   if (info.st_size == 0) {
     if (erase(this, 0) != StorageResult::done || erase(this, 1) != StorageResult::done) {
-      refuse("a disk with room for " + std::to_string(file_size) + " bytes", std::strerror(errno));
+      refuse("free disk space of " + std::to_string(file_size) + " bytes", std::strerror(errno));
     }
   } else if (static_cast<std::uint64_t>(info.st_size) != file_size) {
     refuse("a store of " + std::to_string(file_size) + " bytes (or no file: it is then made)",

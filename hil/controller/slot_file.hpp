@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Non-volatile memory as a file: two slots one after the other, erased bytes 0xFF, every write on the
-/// disk before it counts as done. Each byte is written once between two erases, as on flash.
+/// Non-volatile memory as a file: two consecutive slots, erased bytes 0xFF, every write synced to disk. Each byte is
+/// written once between two erases, as on flash.
 #ifndef FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
 #define FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
 
 #include <cstdint>
 #include <string>
 
-#include "descriptor.hpp"
+#include "bus/descriptor.hpp"
 #include "flexcomp_firmware/store.hpp"
 
 namespace flexcomp::hil {
@@ -30,7 +30,7 @@ class SlotFile {
   bool put(const std::uint8_t* from, std::uint32_t size, std::uint64_t offset);
 
   std::string path_;
-  Descriptor file_;
+  host::Descriptor file_;
 };
 
 }  // namespace flexcomp::hil

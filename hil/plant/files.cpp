@@ -33,7 +33,7 @@ Vector vector3(const YAML::Node& node, double unit) {
   return {unit * v[0], unit * v[1], unit * v[2]};
 }
 
-/// A key of a file: the name it has here, and its unit.
+/// Key of a file with its internal name and unit.
 struct Key {
   std::string_view file;
   std::string_view here;
@@ -85,7 +85,7 @@ constexpr std::array effect_keys{Key{"joint", "joint", 1},
                                  Key{"y_mm", "y", millimetre},
                                  Key{"z_mm", "z", millimetre}};
 
-/// All numbers of a mapping under the names used here; `skipped` keys are for others.
+/// Numbers of a mapping by internal names, without the `skipped` keys.
 template <class Keys>
 std::map<std::string, double> numbers(const std::string& path, const YAML::Node& node, const Keys& keys,
                                       const std::vector<std::string>& skipped = {}) {
@@ -280,7 +280,7 @@ void Table::save(const std::string& path) const {
   std::array<char, 40> cell{};
   for (const auto& row : rows_) {
     for (std::size_t k = 0; k < row.size(); ++k) {
-      // 14 digits: a metre in mm to a millionth of a micrometre, so that rounding plays no part in comparisons.
+      // 14 digits: a metre in mm to a millionth of a micrometre, so that rounding does not affect comparisons.
       std::snprintf(cell.data(), cell.size(), "%s%.14g", k > 0 ? "," : "", row[k]);
       text += cell.data();
     }

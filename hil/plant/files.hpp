@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The plant's own reading of robot, truth and CSV files. Strict where something would be misread in silence.
+/// Readers of robot, truth and CSV files, independent of the host's. Unknown keys are refused.
 #ifndef FLEXCOMP_PLANT_FILES_HPP
 #define FLEXCOMP_PLANT_FILES_HPP
 
@@ -16,7 +16,7 @@ namespace plant {
 Nominal read_robot(const std::string& path);
 Truth read_truth(const std::string& path, const Nominal& nominal);
 
-/// One row of a file with joint columns q1_deg … q6_deg.
+/// Row of a file with joint columns q1_deg … q6_deg.
 struct Row {
   JointVector q_rad{};
   Context context;
@@ -25,7 +25,7 @@ std::vector<Row> read_joints(const std::string& path, const Nominal& nominal);
 
 void save(const std::string& path, const std::string& text);
 
-/// Comma-separated text that is written as a whole at the end.
+/// CSV file, written at the end.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : header_(std::move(header)) {}

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// `flexcomp-plant`: plays the true robot in a closed loop. It knows the hidden errors, gives what an instrument would
-/// see, and says where the arm really goes. Shares no code with the core or the calibrator.
+/// \file `flexcomp-plant`: simulates the true robot of a closed loop: measurements with noise, and the poses
+/// that the arm reaches. Shares no code with the core or the calibrator.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -99,7 +98,7 @@ void measure(const Options& options) {
     std::vector<double> row;
     for (std::size_t j = 0; j < joints; ++j) {
       std::uniform_real_distribution<double> reading(robot.min_rad[j] / degree, robot.max_rad[j] / degree);
-      // As a teach pendant shows it: the written reading is the reading.
+      // Rounded as on a teach pendant: the written reading is the true one.
       const double shown_deg = std::trunc(reading(random) * 1e4) / 1e4;
       q[j] = shown_deg * degree;
       row.push_back(shown_deg);
@@ -135,13 +134,13 @@ void measure(const Options& options) {
               options.measure.c_str(), options.noise.c_str());
 }
 
-/// Where the tracker of session() stands in Fb: in front of the arm, turned towards it and not quite upright.
+/// Pose of the tracker of session() in Fb: in front of the arm, facing it, slightly inclined.
 const KDL::Frame tracker_in_base(KDL::Rotation::RPY(0.3 * degree, -0.2 * degree, 171 * degree),
                                  KDL::Vector(2.5, -0.4, 0.3));
 
-/// What a day in the cell leaves behind: the point list that the tracker's program exports, in the tracker's own frame,
-/// and the robot's log. Both call a pose by its place in the plan. Where a controller corrects the commands, the log has
-/// what the program wanted.
+/// Writes the files of a measuring session: the tracker's point list, in its own frame, and the robot's log.
+/// Poses are named by their index in the plan. Where a controller corrects the commands, the log has the
+/// uncorrected ones.
 void session(const Options& options) {
   const Nominal robot = read_robot(options.robot);
   const Truth truth = read_truth(options.truth, robot);
@@ -190,7 +189,7 @@ void session(const Options& options) {
               options.log.c_str());
 }
 
-/// Of one number over all poses.
+/// Mean, root mean square and maximum of one number over all poses.
 struct Summary {
   double sum = 0, squares = 0, max = 0;
   unsigned count = 0;
@@ -219,7 +218,7 @@ void where(const Options& options) {
   Table table(header);
   Summary position, orientation;
   for (std::size_t n = 0; n < commands.size(); ++n) {
-    // The load and all else that is not a joint angle stand with the wanted poses: corrected commands carry angles only.
+    // The context is that of the uncorrected poses: corrected commands have joint angles only.
     const Reached arm = reached(robot, truth, commands[n].q_rad, wanted[n].context);
     const KDL::Frame target = drawn(robot, wanted[n].q_rad);
     const KDL::Vector off = arm.tool.p - target.p;
@@ -254,14 +253,15 @@ void where(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"The true robot with its hidden errors, for closed loops. Shares no code with what it judges.",
-               "flexcomp-plant"};
+  CLI::App app{
+      "Simulates the true robot with its hidden errors, for closed loops. Shares no code with the "
+      "calibrator.",
+      "flexcomp-plant"};
   app.require_subcommand(1);
   CLI::App* measuring =
-      app.add_subcommand("measure", "What an instrument sees at random poses within the limits");
-  CLI::App* cell = app.add_subcommand(
-      "session", "A tracker's export and the robot's log of planned poses, as a measuring cell leaves them");
-  CLI::App* asking = app.add_subcommand("where", "Where the arm really goes for joint commands");
+      app.add_subcommand("measure", "Measurements with noise at random poses within the limits");
+  CLI::App* cell = app.add_subcommand("session", "A tracker's export and the robot's log at planned poses");
+  CLI::App* asking = app.add_subcommand("where", "Poses that the true arm reaches for joint commands");
   for (CLI::App* command : {measuring, cell, asking}) {
     command->add_option("--robot", options.robot, "Robot file")->required();
     command->add_option("--truth", options.truth, "Truth file: the hidden errors")->required();
@@ -269,7 +269,7 @@ int main(int argc, char** argv) {
   for (CLI::App* command : {measuring, asking})
     command->add_option("-o,--output", options.out, "CSV file to write")->required();
   for (CLI::App* command : {measuring, cell}) {
-    command->add_option("--seed", options.seed, "Of everything that is random")->capture_default_str();
+    command->add_option("--seed", options.seed, "Seed of the random numbers")->capture_default_str();
     command->add_option("--noise", options.noise, "N1: 0.035 mm and 0.007 deg per axis; N2: twice that; none")
         ->check(CLI::IsMember({"N1", "N2", "none"}))
         ->capture_default_str();
@@ -286,7 +286,7 @@ int main(int argc, char** argv) {
   measuring->add_flag("--moves", options.moves,
                       "Each joint comes to the pose by a random motion, which is recorded");
   cell->add_option("--joints", options.joints,
-                   "The plan: joints q1_deg … q6_deg, with payload_kg and what else acts")
+                   "The plan: joints q1_deg … q6_deg, with payload_kg and other context columns")
       ->required();
   cell->add_option(
       "--nominal", options.nominal,
@@ -297,10 +297,9 @@ int main(int argc, char** argv) {
   cell->add_option("--log", options.log, "The robot's log to write")->required();
   asking->add_option("--joints", options.joints, "Commanded joints, q1_deg … q6_deg")->required();
   asking
-      ->add_option(
-          "--nominal", options.nominal,
-          "Uncorrected joints: the arm shall go where the maker's drawing puts them; with the context "
-          "(payload_kg, …)")
+      ->add_option("--nominal", options.nominal,
+                   "Uncorrected joints, whose nominal poses are the reference; with the context "
+                   "(payload_kg, …)")
       ->required();
   asking->add_option("--json", options.json, "Means and maxima as JSON");
   try {

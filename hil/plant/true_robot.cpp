@@ -44,7 +44,7 @@ double torque(const Frames& frames, const Loads& loads, std::size_t i) {
   return KDL::dot(frames[i].M.UnitZ(), loads.moment_about(frames[i].p));
 }
 
-/// What a link's own weight does, as a lever without a unit: the sine of the angle at which it hangs.
+/// Link-weight lever, Eq. (M13): sine of the angle between the link and the vertical.
 double weight_lever(const Frames& frames, const Vector& gravity, std::size_t joint, std::size_t far) {
   const Vector z = frames[joint].M.UnitZ();
   const Vector arm = frames[far].p - frames[joint].p;
@@ -80,12 +80,12 @@ std::size_t index_of(const Effect& effect, const std::string& key, std::size_t o
   return static_cast<std::size_t>(n - 1);
 }
 
-/// Everything that effects look at, and everything that they move.
+/// Inputs and outputs of the effects at one pose.
 struct Arm {
   const Nominal& nominal;
   const JointVector& q;
   const Context& context;
-  Frames frames;  ///< with the constant errors only: there loads and levers are taken
+  Frames frames;  ///< with the constant errors only, for loads and levers, Eq. (M15)
   Loads loads;
 
   std::array<Link, joints> link;
@@ -170,7 +170,7 @@ void Arm::apply(const Effect& e) {
     apply_to_base(e);
   } else if (e.name == "reflector_slip") {
     if (context.time_s >= e.of("after")) slip += Vector(e.of("x"), e.of("y"), e.of("z"));
-  } else if (e.name != "payload_error") {  // which is taken with the load
+  } else if (e.name != "payload_error") {  // is part of the load
     apply_to_joint(e);
   }
 }
@@ -212,7 +212,7 @@ Reached reached(const Nominal& nominal, const Truth& truth, const JointVector& q
     arm.link[i].alpha += truth.error[i].alpha;
     arm.link[i].beta += truth.error[i].beta;
   }
-  // Loads and levers belong to the arm with its constant errors; what they do is added to it afterwards.
+  // Two passes, Eq. (M15): loads and levers by the constant errors, then all effects.
   arm.frames = chain(arm.link, q);
   double mass = context.payload_kg;
   Vector com = context.payload_com_m;

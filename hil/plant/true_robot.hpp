@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// The robot as it really is, hidden from the calibrator: nominal chain, true errors and where the arm goes with them.
-/// Written from the words of the model (docs of this project, Chen et al. 2019) on KDL's frames; it shares no code with
-/// the core, so that the two can judge each other. Inside everything is SI.
+/// \file True robot of a closed loop: nominal chain plus hidden errors, unknown to the calibrator. Implemented
+/// from docs/model.md and Chen et al. 2019 on KDL's frames; it shares no code with the core, so that each
+/// validates the other. SI inside.
 #ifndef FLEXCOMP_PLANT_TRUE_ROBOT_HPP
 #define FLEXCOMP_PLANT_TRUE_ROBOT_HPP
 
@@ -40,7 +39,7 @@ struct Nominal {
   double reference_temperature_c = 20;
 };
 
-/// An effect of the catalogue as the file gives it: numbers in SI under their keys without the unit.
+/// Effect of the catalogue: values in SI by their keys without the unit.
 struct Effect {
   std::string name;
   std::map<std::string, double> value;
@@ -72,10 +71,10 @@ struct Reached {
   KDL::Vector slip;  ///< of the measured point, in Ftool
 };
 
-/// Where the arm goes.
+/// Pose that the true arm reaches, Eq. (M1).
 Reached reached(const Nominal& nominal, const Truth& truth, const JointVector& q_rad, const Context& context);
 
-/// Where the maker's drawing says it goes.
+/// Pose by the nominal chain.
 KDL::Frame drawn(const Nominal& nominal, const JointVector& q_rad);
 
 /// Angle of a rotation, accurate for small ones too.

@@ -16,10 +16,10 @@ constexpr std::string_view can_form = "can:IFACE[:NODE]";
 constexpr std::string_view tcp_form = "modbus-tcp:HOST[:PORT][:UNIT]";
 constexpr std::string_view rtu_form = "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]";
 
-/// Says what is wrong with one address.
-class Complaint {
+/// Throws the error of one address.
+class AddressError {
  public:
-  Complaint(std::string_view address, std::string_view form) : address_(address), form_(form) {}
+  AddressError(std::string_view address, std::string_view form) : address_(address), form_(form) {}
   [[noreturn]] void operator()(const std::string& what) const {
     throw std::invalid_argument(fmt::format("bus address '{}': {}; expected {}", address_, what, form_));
   }
@@ -29,7 +29,7 @@ class Complaint {
   std::string_view form_;
 };
 
-/// The whole text as a decimal number.
+/// Converts a text that is one decimal number.
 std::optional<std::uint32_t> number(std::string_view text) {
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -38,10 +38,10 @@ std::optional<std::uint32_t> number(std::string_view text) {
 }
 
 template <class T>
-T in_range(std::string_view text, std::string_view what, T least, T most, const Complaint& complain) {
+T in_range(std::string_view text, std::string_view what, T least, T most, const AddressError& fail) {
   const std::optional<std::uint32_t> value = number(text);
   if (!value || *value < least || *value > most) {
-    complain(fmt::format("{} is a whole number from {} to {}, not '{}'", what, least, most, text));
+    fail(fmt::format("{} is a whole number from {} to {}, not '{}'", what, least, most, text));
   }
   return static_cast<T>(*value);
 }
@@ -56,41 +56,41 @@ std::vector<std::string_view> fields(std::string_view text) {
   }
 }
 
-CanAddress parse_can(std::string_view rest, const Complaint& complain) {
+CanAddress parse_can(std::string_view rest, const AddressError& fail) {
   const std::vector<std::string_view> part = fields(rest);
-  if (part.size() > 2) complain("there are too many fields");
-  if (part[0].empty()) complain("the interface is missing");
+  if (part.size() > 2) fail("there are too many fields");
+  if (part[0].empty()) fail("the interface is missing");
   // A longer name would be cut off and could name another interface.
   if (part[0].size() >= IF_NAMESIZE) {
-    complain(fmt::format("the name of an interface has at most {} characters", IF_NAMESIZE - 1));
+    fail(fmt::format("the name of an interface has at most {} characters", IF_NAMESIZE - 1));
   }
   CanAddress out;
   out.interface = part[0];
-  if (part.size() > 1) out.node = in_range<std::uint8_t>(part[1], "NODE", 1, 127, complain);
+  if (part.size() > 1) out.node = in_range<std::uint8_t>(part[1], "NODE", 1, 127, fail);
   return out;
 }
 
-ModbusTcpAddress parse_tcp(std::string_view rest, const Complaint& complain) {
+ModbusTcpAddress parse_tcp(std::string_view rest, const AddressError& fail) {
   ModbusTcpAddress out;
   std::vector<std::string_view> part;
   if (rest.starts_with('[')) {
     const std::size_t close = rest.find(']');
-    if (close == std::string_view::npos) complain("the bracket is not closed");
+    if (close == std::string_view::npos) fail("the bracket is not closed");
     out.host = rest.substr(1, close - 1);
     part = fields(rest.substr(close + 1));
-    if (!part[0].empty()) complain(fmt::format("'{}' follows the bracket", part[0]));
+    if (!part[0].empty()) fail(fmt::format("'{}' follows the bracket", part[0]));
   } else {
     part = fields(rest);
     out.host = part[0];
   }
-  if (out.host.empty()) complain("the host is missing");
-  if (part.size() > 3) complain("there are too many fields (an IPv6 address stands in square brackets)");
-  if (part.size() > 1) out.port = in_range<std::uint16_t>(part[1], "PORT", 1, 65535, complain);
-  if (part.size() > 2) out.unit = in_range<std::uint8_t>(part[2], "UNIT", 0, 255, complain);
+  if (out.host.empty()) fail("the host is missing");
+  if (part.size() > 3) fail("there are too many fields (an IPv6 address stands in square brackets)");
+  if (part.size() > 1) out.port = in_range<std::uint16_t>(part[1], "PORT", 1, 65535, fail);
+  if (part.size() > 2) out.unit = in_range<std::uint8_t>(part[2], "UNIT", 0, 255, fail);
   return out;
 }
 
-ModbusRtuAddress parse_rtu(std::string_view rest, const Complaint& complain) {
+ModbusRtuAddress parse_rtu(std::string_view rest, const AddressError& fail) {
   ModbusRtuAddress out;
   constexpr std::uint32_t most_units = 247;
   std::vector<std::string_view> part = fields(rest);
@@ -98,7 +98,7 @@ ModbusRtuAddress parse_rtu(std::string_view rest, const Complaint& complain) {
     return part.size() > 1 ? number(part.back()) : std::nullopt;
   };
   if (const auto n = last_number(); n && *n <= most_units) {
-    out.unit = in_range<std::uint8_t>(part.back(), "UNIT", 1, most_units, complain);
+    out.unit = in_range<std::uint8_t>(part.back(), "UNIT", 1, most_units, fail);
     part.pop_back();
   }
   const bool one_letter = part.size() > 1 && part.back().size() == 1 && !number(part.back());
@@ -106,19 +106,19 @@ ModbusRtuAddress parse_rtu(std::string_view rest, const Complaint& complain) {
     const char letter = part.back()[0];
     const std::string_view known = "NEOneo";
     const std::size_t k = known.find(letter);
-    if (k == std::string_view::npos) complain(fmt::format("PARITY is N, E or O, not '{}'", letter));
+    if (k == std::string_view::npos) fail(fmt::format("PARITY is N, E or O, not '{}'", letter));
     out.parity = static_cast<Parity>(known[k % 3]);
     part.pop_back();
-    if (!last_number()) complain("PARITY stands behind a BAUD");
+    if (!last_number()) fail("PARITY stands behind a BAUD");
   }
   if (last_number()) {
-    out.baud = in_range<std::uint32_t>(part.back(), "BAUD", 300, 4000000, complain);
+    out.baud = in_range<std::uint32_t>(part.back(), "BAUD", 300, 4000000, fail);
     part.pop_back();
   }
-  // What is left is the device, whose own colons belong to it.
+  // The rest is the device, with any colons of its own.
   const std::size_t length = static_cast<std::size_t>(part.back().data() + part.back().size() - rest.data());
   out.device = rest.substr(0, length);
-  if (out.device.empty()) complain("the device is missing");
+  if (out.device.empty()) fail("the device is missing");
   return out;
 }
 
@@ -144,7 +144,7 @@ BusAddress parse_bus_address(std::string_view text) {
   if (const auto can = rest("can:")) return {parse_can(*can, {text, can_form})};
   if (const auto tcp = rest("modbus-tcp:")) return {parse_tcp(*tcp, {text, tcp_form})};
   if (const auto rtu = rest("modbus-rtu:")) return {parse_rtu(*rtu, {text, rtu_form})};
-  Complaint{text, fmt::format("{}, {} or {}", can_form, tcp_form, rtu_form)}("no such kind of bus");
+  AddressError{text, fmt::format("{}, {} or {}", can_form, tcp_form, rtu_form)}("no such kind of bus");
 }
 
 }  // namespace flexcomp::host

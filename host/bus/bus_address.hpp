@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How a controller is named on the command line: which bus, where on it, and as whom.
+/// Addresses of controllers: bus, interface or host, node or unit.
 ///
 ///     can:IFACE[:NODE]                          NODE 1 … 127, default 1
 ///     modbus-tcp:HOST[:PORT][:UNIT]             PORT default 502, UNIT 0 … 255, default 255 (the device itself)
 ///     modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]  BAUD default 19200, PARITY N, E or O, default E, UNIT 1 … 247, default 1
 ///
 /// The defaults are those of the standards (Modbus messaging on TCP/IP 1.0b, 4.4.1; serial line 1.02, 2.5.1). An IPv6
-/// address stands in square brackets. A serial line's fields are read from the right, so a DEVICE may have colons of
-/// its own; a single number of at most 247 is a UNIT, a larger one a BAUD.
+/// address stands in square brackets. A serial line's fields are read from the right, so a DEVICE may contain
+/// colons; a single number of at most 247 is a UNIT, a larger one a BAUD.
 #ifndef FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
 #define FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
 
@@ -42,11 +42,12 @@ struct ModbusRtuAddress {
 struct BusAddress {
   std::variant<CanAddress, ModbusTcpAddress, ModbusRtuAddress> at;
 
-  /// In full, with the defaults filled in: can:vcan0:1.
+  /// The address with all defaults filled in: can:vcan0:1.
   std::string text() const;
 };
 
-/// \throws std::invalid_argument  what is wrong with the address, and the form that is expected
+/// Parses an address of the grammar above.
+/// \throws std::invalid_argument  naming the wrong field and the expected form
 BusAddress parse_bus_address(std::string_view text);
 
 }  // namespace flexcomp::host

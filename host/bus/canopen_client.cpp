@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>
 
+#include "bus/descriptor.hpp"
 #include "bus/sdo_client.hpp"
 #include "flexcomp/bytes.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
@@ -28,24 +29,6 @@ namespace {
 namespace co = wire::canopen;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
-
-/// An open file descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
@@ -70,25 +53,25 @@ Descriptor open_can(const std::string& interface, unsigned node, const std::stri
   return out;
 }
 
-/// An SDO channel has one client: two would take each other's answers for their own. Programs on this machine take
-/// turns by a name that only one of them can have; it is as wide as the interface (one network namespace) and goes
-/// with the process, however it ends.
-Descriptor take_channel(const CanAddress& can, const ClientOptions& options, const std::string& where) {
+/// Locks the SDO channel against other programs of this machine: with two clients each would receive the
+/// other's answers. The lock is an abstract socket name, unique in the network namespace, which the kernel
+/// frees when the process ends.
+Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, const std::string& where) {
   Descriptor out(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   if (out.get() < 0) throw BusError(fmt::format("{}: no local socket: {}", where, reason(errno)));
   const std::string name = fmt::format("flexcomp-sdo-{}-{}", can.interface, can.node);
   sockaddr_un at{};
   at.sun_family = AF_UNIX;
-  // The first byte stays 0: a name without a file.
+  // The first byte stays 0: an abstract name, without a file.
   std::copy(name.begin(), name.end(), at.sun_path + 1);
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  const auto end = steady_clock::now() + options.patience;
+  const auto end = steady_clock::now() + options.response_timeout;
   while (::bind(out.get(), reinterpret_cast<const sockaddr*>(&at), size) != 0) {
     if (errno != EADDRINUSE) throw BusError(fmt::format("{}: {}", where, reason(errno)));
     if (steady_clock::now() > end) {
       throw BusError(
           fmt::format("{}: another program on this machine has been talking to node {} for {:.1f} s", where,
-                      can.node, seconds(options.patience)));
+                      can.node, seconds(options.response_timeout)));
     }
     std::this_thread::sleep_for(milliseconds(20));
   }
@@ -101,11 +84,11 @@ class CanopenClient final : public ControllerClient {
                 Descriptor socket)
       : ControllerClient(address, options),
         node_(std::get<CanAddress>(address.at).node),
-        timeout_(options.patience / attempts),
+        timeout_(options.response_timeout / attempts),
         channel_(std::move(channel)),
         socket_(std::move(socket)),
         sdo_(socket_.get(), node_, timeout_) {
-    greet();
+    read_capability();
   }
 
  protected:
@@ -119,7 +102,7 @@ class CanopenClient final : public ControllerClient {
   }
 
   void send_image(std::span<const std::uint8_t> image, const Progress& progress) override {
-    // The whole transfer again where a frame got lost: an aborted one leaves nothing behind.
+    // A lost frame repeats the whole transfer: the server drops an aborted one.
     download({co::image, co::image_staging}, image, attempts, progress);
   }
 
@@ -131,7 +114,7 @@ class CanopenClient final : public ControllerClient {
       last_argument_ = argument;
     }
     store_u16(bytes.data(), static_cast<std::uint16_t>(command));
-    // Sent once: a command whose answer got lost may have been carried out.
+    // Sent once: a command whose answer got lost may have been executed.
     download({co::command, co::command_number}, std::span(bytes).first(2), 1);
   }
 
@@ -139,7 +122,7 @@ class CanopenClient final : public ControllerClient {
     return upload({co::image, co::image_active}, size, progress);
   }
 
-  Bytes answer_probe(std::span<const std::uint8_t> request) override {
+  Bytes exchange_probe(std::span<const std::uint8_t> request) override {
     download({co::probe, co::probe_request}, request, attempts);
     return upload({co::probe, co::probe_response}, wire::probe_response_bytes);
   }
@@ -149,7 +132,7 @@ class CanopenClient final : public ControllerClient {
 
   Bytes upload(ObjectAddress object, std::size_t size, const Progress& progress = {}) {
     Bytes out;
-    ask("to read", object, attempts, [&] { out = sdo_.upload(object, progress); });
+    retry("to read", object, attempts, [&] { out = sdo_.upload(object, progress); });
     if (out.size() != size) {
       throw BusError(fmt::format("{}: object {} of node {} has {} bytes, expected {}", where(), object.text(),
                                  node_, out.size(), size));
@@ -159,22 +142,22 @@ class CanopenClient final : public ControllerClient {
 
   void download(ObjectAddress object, std::span<const std::uint8_t> data, int times,
                 const Progress& progress = {}) {
-    ask("to write", object, times, [&] { sdo_.download(object, data, progress); });
+    retry("to write", object, times, [&] { sdo_.download(object, data, progress); });
   }
 
   template <class Transfer>
-  void ask(const char* what, ObjectAddress object, int times, const Transfer& transfer) {
+  void retry(const char* what, ObjectAddress object, int times, const Transfer& transfer) {
     for (int attempt = 1;; ++attempt) {
       try {
         transfer();
         return;
       } catch (const SdoAbort& e) {
-        // The server has lost the thread of a transfer of which a frame got lost.
+        // After a lost frame the server aborts with one of these codes.
         const bool lost = !e.by_server() || e.code() == co::abort::toggle || e.code() == co::abort::timeout ||
                           e.code() == co::abort::command;
         if (lost && attempt < times) continue;
         if (!e.by_server()) throw BusError(fmt::format("{}: node {}: {}", where(), node_, e.what()));
-        throw SaidNo{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
+        throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
       } catch (const SdoTimeout& e) {
         if (attempt < times) continue;
         throw NoAnswer(fmt::format("{}: node {} did not answer when asked {} object {} ({} of {:.2f} s): {}",
@@ -200,7 +183,7 @@ class CanopenClient final : public ControllerClient {
 std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options) {
   const auto& can = std::get<CanAddress>(address.at);
   Descriptor socket = open_can(can.interface, can.node, address.text());
-  Descriptor channel = take_channel(can, options, address.text());
+  Descriptor channel = lock_channel(can, options, address.text());
   return std::make_unique<CanopenClient>(address, options, std::move(channel), std::move(socket));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A controller on CANopen, through SocketCAN (flexcomp/wire/canopen_objects.hpp).
+/// CANopen client of a controller over SocketCAN: objects of flexcomp/wire/canopen_objects.hpp by SDO (CiA 301, 7.2.4).
 #ifndef FLEXCOMP_HOST_BUS_CANOPEN_CLIENT_HPP
 #define FLEXCOMP_HOST_BUS_CANOPEN_CLIENT_HPP
 
@@ -10,10 +10,10 @@
 
 namespace flexcomp::host {
 
-/// `address` is one of CAN. \throws BusError
+/// Connects to a node. \param address  holds a CanAddress \throws BusError
 std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options);
 
-/// The same over a socket that is open already and gives and takes struct can_frame; it is closed with the client.
+/// Connects over an open socket of struct can_frame, which the client owns and closes.
 std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options,
                                                   int socket);
 

@@ -17,9 +17,9 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr milliseconds between_questions{10};
+constexpr milliseconds polling_interval{10};
 
-/// A set that is longer than this is no image of ours, whatever the controller says.
+/// Limit of the length that a controller may announce, bytes.
 constexpr std::size_t longest_image = std::size_t{1} << 24U;
 
 bool writes_memory(wire::Command command) {
@@ -28,9 +28,9 @@ bool writes_memory(wire::Command command) {
          command == wire::Command::restore_defaults;
 }
 
-/// The status tells the answer to the last command of anybody; whether a command of ours has been carried out is seen
-/// from what it does.
-bool has_happened(wire::Command command, const wire::Status& before, const wire::Status& now) {
+/// Tells from the active set whether a command took effect. The status has the answer to the last command of
+/// any client, so that the answer alone proves nothing.
+bool took_effect(wire::Command command, const wire::Status& before, const wire::Status& now) {
   constexpr auto trial = static_cast<std::uint16_t>(wire::StoreState::trial);
   const bool other_set = now.active_slot != before.active_slot ||
                          now.active_sequence != before.active_sequence || now.active_crc != before.active_crc;
@@ -95,9 +95,10 @@ std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail)
 ControllerClient::ControllerClient(BusAddress address, const ClientOptions& options)
     : address_(std::move(address)), options_(options), where_(address_.text()) {}
 
-void ControllerClient::greet() {
+void ControllerClient::read_capability() {
   Bytes bytes;
-  insist("read its capabilities", [&] { bytes = read_record(Record::capability, wire::capability_bytes); });
+  retry_while_busy("read its capabilities",
+                   [&] { bytes = read_record(Record::capability, wire::capability_bytes); });
   wire::decode(bytes.data(), byte_order(), capability_);
   constexpr unsigned major = wire::protocol_version >> 8U;
   if (capability_.protocol >> 8U != major || capability_.joints != wire::joints) {
@@ -111,7 +112,7 @@ void ControllerClient::greet() {
 
 wire::Status ControllerClient::status() {
   Bytes bytes;
-  insist("read its status", [&] { bytes = read_record(Record::status, wire::status_bytes); });
+  retry_while_busy("read its status", [&] { bytes = read_record(Record::status, wire::status_bytes); });
   wire::Status out;
   wire::decode(bytes.data(), byte_order(), out);
   return out;
@@ -121,9 +122,9 @@ std::optional<Robot> ControllerClient::robot() {
   Bytes bytes;
   try {
     bytes = read_record(Record::robot, wire::robot_record_bytes);
-  } catch (const SaidNo& no) {
-    if (no.no_such_object) return std::nullopt;
-    explain("read which robot it is for", no);
+  } catch (const BusRefusal& refusal) {
+    if (refusal.no_such_object) return std::nullopt;
+    throw_refusal("read which robot it is for", refusal);
   }
   Robot out;
   std::array<char, wire::robot_name_bytes> name{};
@@ -141,22 +142,22 @@ std::optional<Robot> ControllerClient::robot() {
 }
 
 void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress& progress) {
-  insist("take in a set", [&] { send_image(image, progress); });
+  retry_while_busy("take in a set", [&] { send_image(image, progress); });
 }
 
 void ControllerClient::run(wire::Command command, std::uint32_t argument) {
   const std::string what = describe(command);
   const bool background = writes_memory(command);
   const wire::Status before = background ? status() : wire::Status();
-  insist(what, [&] { send_command(command, argument); });
+  retry_while_busy(what, [&] { send_command(command, argument); });
   if (!background) return;
-  const auto end = steady_clock::now() + options_.working;
+  const auto end = steady_clock::now() + options_.write_timeout;
   for (;;) {
     const wire::Status now = status();
     if (now.state != static_cast<std::uint16_t>(wire::StoreState::working)) {
       const auto answer = static_cast<wire::Answer>(now.answer);
       const auto refusal = static_cast<Refusal>(now.refusal);
-      if (has_happened(command, before, now)) return;
+      if (took_effect(command, before, now)) return;
       const std::string why = answer == wire::Answer::accepted
                                   ? "nothing has changed, and the reason is overtaken by another client"
                                   : describe(answer, refusal, now.detail);
@@ -165,14 +166,14 @@ void ControllerClient::run(wire::Command command, std::uint32_t argument) {
     }
     if (steady_clock::now() > end) {
       throw NoAnswer(fmt::format("{}: asked to {}, the controller is still writing its memory after {:.1f} s",
-                                 where_, what, static_cast<double>(options_.working.count()) / 1000));
+                                 where_, what, static_cast<double>(options_.write_timeout.count()) / 1000));
     }
-    std::this_thread::sleep_for(between_questions);
+    std::this_thread::sleep_for(polling_interval);
   }
 }
 
 Bytes ControllerClient::active_image(const Progress& progress) {
-  // The set may change between two requests: what was read counts only if the same set was active before and after.
+  // The set may change between two requests: the bytes are valid only if the same set was active before and after.
   for (int attempt = 0; attempt < 3; ++attempt) {
     const wire::Status before = status();
     if (before.active_slot == wire::no_slot) return {};
@@ -182,7 +183,7 @@ Bytes ControllerClient::active_image(const Progress& progress) {
     }
     Bytes image;
     try {
-      insist("read the active set", [&] { image = read_image(before.active_bytes, progress); });
+      retry_while_busy("read the active set", [&] { image = read_image(before.active_bytes, progress); });
     } catch (const RefusedByController&) {
       if (status().active_sequence == before.active_sequence) throw;
       continue;
@@ -200,29 +201,29 @@ wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
   std::array<std::uint8_t, wire::probe_request_bytes> question{};
   wire::encode(request, byte_order(), question.data());
   Bytes bytes;
-  insist("answer a probe", [&] { bytes = answer_probe(question); });
+  retry_while_busy("answer a probe", [&] { bytes = exchange_probe(question); });
   wire::ProbeResponse out;
   wire::decode(bytes.data(), byte_order(), out);
   return out;
 }
 
-/// Busy is a matter of moments: another client's transfer, or the cycle has not taken the last set yet.
+/// Repeats a request until the controller is no longer busy with another client's transfer or a switch of sets.
 template <class Action>
-void ControllerClient::insist(const std::string& what, const Action& action) {
-  const auto end = steady_clock::now() + options_.patience;
+void ControllerClient::retry_while_busy(const std::string& request, const Action& action) {
+  const auto end = steady_clock::now() + options_.response_timeout;
   for (;;) {
     try {
       action();
       return;
-    } catch (const SaidNo& no) {
-      if (!no.busy || steady_clock::now() > end) explain(what, no);
+    } catch (const BusRefusal& refusal) {
+      if (!refusal.busy || steady_clock::now() > end) throw_refusal(request, refusal);
     }
-    std::this_thread::sleep_for(2 * between_questions);
+    std::this_thread::sleep_for(2 * polling_interval);
   }
 }
 
-void ControllerClient::explain(const std::string& what, const SaidNo& no) {
-  // The bus has one number for many reasons; the status record has the reason.
+void ControllerClient::throw_refusal(const std::string& request, const BusRefusal& from_bus) {
+  // A bus has one code for many reasons; the status record has the reason.
   wire::Status now;
   try {
     const Bytes bytes = read_record(Record::status, wire::status_bytes);
@@ -232,18 +233,21 @@ void ControllerClient::explain(const std::string& what, const SaidNo& no) {
   }
   const auto answer = static_cast<wire::Answer>(now.answer);
   const auto refusal = static_cast<Refusal>(now.refusal);
-  // An answer that does not fit is the one to another client's command, given in between.
-  const bool told = now.answer != 0xFFFF && answer != wire::Answer::accepted && answer != wire::Answer::busy;
-  if (no.busy) {
+  // An answer that is no refusal belongs to another client's command.
+  const bool has_reason =
+      now.answer != 0xFFFF && answer != wire::Answer::accepted && answer != wire::Answer::busy;
+  if (from_bus.busy) {
     throw RefusedByController(
         fmt::format("{}: asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
-                    where_, what, static_cast<double>(options_.patience.count()) / 1000, no.code),
+                    where_, request, static_cast<double>(options_.response_timeout.count()) / 1000,
+                    from_bus.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(
-      fmt::format("{}: asked to {}, the controller refused: {}", where_, what,
-                  told ? fmt::format("{} ({})", describe(answer, refusal, now.detail), no.code) : no.code),
-      told ? answer : wire::Answer::refused, told ? refusal : Refusal::none);
+      fmt::format("{}: asked to {}, the controller refused: {}", where_, request,
+                  has_reason ? fmt::format("{} ({})", describe(answer, refusal, now.detail), from_bus.code)
+                             : from_bus.code),
+      has_reason ? answer : wire::Answer::refused, has_reason ? refusal : Refusal::none);
 }
 
 std::unique_ptr<ControllerClient> connect(const BusAddress& address, const ClientOptions& options) {

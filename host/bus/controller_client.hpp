@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A controller as seen over a bus: the same conversation on Modbus and CANopen (flexcomp/wire/store_state.hpp).
+/// Client of a controller, the same protocol on Modbus and CANopen (flexcomp/wire/store_state.hpp).
 #ifndef FLEXCOMP_HOST_BUS_CONTROLLER_CLIENT_HPP
 #define FLEXCOMP_HOST_BUS_CONTROLLER_CLIENT_HPP
 
@@ -24,18 +24,18 @@ namespace flexcomp::host {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Called now and then during a transfer.
+/// Reports bytes transferred so far.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 struct ClientOptions {
-  /// How long a controller may keep silent before it is given up. On CAN and on a serial line, where a frame can get
-  /// lost, it is asked three times in this time; a serial line's own time for the bytes comes on top.
-  std::chrono::milliseconds patience{3000};
-  /// How long non-volatile memory may take to be erased and written.
-  std::chrono::milliseconds working{20000};
+  /// Time limit of a response. On CAN and serial lines, where frames get lost, three attempts share it; on a
+  /// serial line the transmission time is added.
+  std::chrono::milliseconds response_timeout{3000};
+  /// Time limit for erasing and writing non-volatile memory.
+  std::chrono::milliseconds write_timeout{20000};
 };
 
-/// The controller understood and said no.
+/// The controller refused a request.
 class RefusedByController : public BusError {
  public:
   RefusedByController(const std::string& message, wire::Answer answer, Refusal refusal)
@@ -48,13 +48,13 @@ class RefusedByController : public BusError {
   Refusal refusal_;
 };
 
-/// Nobody answered in time.
+/// No response within the time limit.
 class NoAnswer : public BusError {
  public:
   using BusError::BusError;
 };
 
-/// One controller. Every member throws BusError, whose message names the bus and what was asked.
+/// Connection to one controller. Every member throws BusError, whose message names the address and the request.
 class ControllerClient {
  public:
   virtual ~ControllerClient() = default;
@@ -63,57 +63,57 @@ class ControllerClient {
 
   const std::string& where() const { return where_; }
 
-  /// What the controller is and holds; asked once, when the connection is made.
+  /// Capability record: bases, capacities, hashes. Read once, when the connection is made.
   const wire::Capability& capability() const { return capability_; }
   wire::Status status();
 
-  /// The arm that the controller was built for, checked against its hashes; nothing where it does not tell. Its name
-  /// is empty where the controller knows only the hash.
+  /// Reads the nominal robot of the controller and verifies it against the capability's hashes; nothing where the
+  /// controller has no robot record. The name is empty where it has only the hash.
   std::optional<Robot> robot();
 
-  /// Announces an image and sends its bytes. The active set stays as it is.
+  /// Transfers an image into the staging area. The active set does not change.
   void stage(std::span<const std::uint8_t> image, const Progress& progress = {});
 
-  /// Runs a command, and waits for its end where it writes non-volatile memory. A controller that is busy is asked
-  /// again until patience ends. \throws RefusedByController with the controller's reason in words
+  /// Executes a store command, and waits for its end where it writes non-volatile memory. A busy controller is asked
+  /// again until response_timeout. \throws RefusedByController with the controller's reason
   void run(wire::Command command, std::uint32_t argument = 0);
 
-  /// The active image; empty where there is none. All of it is of one set.
+  /// Reads the active image, consistent: the same set was active before and after. Empty where there is none.
   Bytes active_image(const Progress& progress = {});
 
   wire::ProbeResponse probe(const wire::ProbeRequest& request);
 
  protected:
-  /// A record as bytes, in the order of the bus.
+  /// Records that are read as bytes, in the byte order of the bus.
   enum class Record { capability, status, robot };
 
-  /// What a bus tells where the controller says no: whether it is worth asking again, and the code in words.
-  struct SaidNo {
-    bool busy = false;
+  /// Refusal as the bus reports it: Modbus exception or SDO abort.
+  struct BusRefusal {
+    bool busy = false;  ///< worth another attempt
     bool no_such_object = false;
-    std::string code;
+    std::string code;  ///< number and text
   };
 
   ControllerClient(BusAddress address, const ClientOptions& options);
 
-  /// Reads the capability record and refuses a protocol that is not known. To be called once the bus is open.
-  void greet();
+  /// Reads the capability record and refuses an unknown protocol. To be called once the bus is open.
+  void read_capability();
 
-  // What a bus does. Each throws SaidNo where the controller refuses and BusError where it does not answer.
+  // Primitives of a bus. Each throws BusRefusal where the controller refuses and BusError where it does not respond.
   virtual wire::ByteOrder byte_order() const = 0;
   virtual Bytes read_record(Record record, std::size_t size) = 0;
   virtual void send_image(std::span<const std::uint8_t> image, const Progress& progress) = 0;
   virtual void send_command(wire::Command command, std::uint32_t argument) = 0;
   virtual Bytes read_image(std::size_t size, const Progress& progress) = 0;
-  virtual Bytes answer_probe(std::span<const std::uint8_t> request) = 0;
+  virtual Bytes exchange_probe(std::span<const std::uint8_t> request) = 0;
 
   const BusAddress& address() const { return address_; }
   const ClientOptions& options() const { return options_; }
 
  private:
   template <class Action>
-  void insist(const std::string& what, const Action& action);
-  [[noreturn]] void explain(const std::string& what, const SaidNo& no);
+  void retry_while_busy(const std::string& request, const Action& action);
+  [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& refusal);
 
   BusAddress address_;
   ClientOptions options_;
@@ -121,13 +121,13 @@ class ControllerClient {
   wire::Capability capability_;
 };
 
-/// Opens the bus and asks who is there. \throws BusError
+/// Opens the bus and reads the capability of the controller. \throws BusError
 std::unique_ptr<ControllerClient> connect(const BusAddress& address, const ClientOptions& options = {});
 
-/// "commit the set"
+/// Text of a command for messages: "commit the set".
 std::string describe(wire::Command command);
 
-/// "refused", with the reason and the detail in words.
+/// Text of an answer for messages, with the reason and its detail: "unknown basis (basis 40)".
 std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail);
 
 }  // namespace flexcomp::host

@@ -31,7 +31,7 @@ struct Free {
 
 void set_register(std::span<std::uint16_t> to, std::span<const std::uint8_t> bytes) {
   for (std::size_t k = 0; k < to.size(); ++k) {
-    // Of an odd length the last low byte is padding.
+    // The last low byte of an odd length is padding.
     const unsigned low = 2 * k + 1 < bytes.size() ? bytes[2 * k + 1] : 0U;
     to[k] = static_cast<std::uint16_t>((static_cast<unsigned>(bytes[2 * k]) << 8U) | low);
   }
@@ -52,7 +52,7 @@ class ModbusClient final : public ControllerClient {
     } else {
       open_rtu(std::get<ModbusRtuAddress>(address.at));
     }
-    greet();
+    read_capability();
   }
 
  protected:
@@ -66,8 +66,9 @@ class ModbusClient final : public ControllerClient {
     std::array<std::uint16_t, map::most_read> registers{};
     for (std::size_t left = size / 2; left != 0;) {
       const std::size_t n = std::min<std::size_t>(left, map::most_read);
-      ask(fmt::format("to read {} registers from 0x{:04X}", n, from), attempts_,
-          [&] { return modbus_read_registers(context_.get(), from, static_cast<int>(n), registers.data()); });
+      send(fmt::format("to read {} registers from 0x{:04X}", n, from), attempts_, [&] {
+        return modbus_read_registers(context_.get(), from, static_cast<int>(n), registers.data());
+      });
       append(out, {registers.data(), n});
       from = static_cast<std::uint16_t>(from + n);
       left -= n;
@@ -84,7 +85,7 @@ class ModbusClient final : public ControllerClient {
       const std::size_t n = (size + 1) / 2;
       set_number(registers, at);
       set_register({registers.data() + 2, n}, image.subspan(at, size));
-      ask(fmt::format("to take the bytes from {} of the set", at), attempts_, [&] {
+      send(fmt::format("to take the bytes from {} of the set", at), attempts_, [&] {
         return modbus_write_registers(context_.get(), map::staging_offset, static_cast<int>(2 + n),
                                       registers.data());
       });
@@ -96,8 +97,8 @@ class ModbusClient final : public ControllerClient {
     std::array<std::uint16_t, 3> registers{};
     set_number(registers, argument);
     registers[2] = static_cast<std::uint16_t>(command);
-    // Sent once: a command whose answer got lost may have been carried out.
-    ask(fmt::format("to {}", describe(command)), 1, [&] {
+    // Sent once: a command whose answer got lost may have been executed.
+    send(fmt::format("to {}", describe(command)), 1, [&] {
       return modbus_write_registers(context_.get(), map::argument, static_cast<int>(registers.size()),
                                     registers.data());
     });
@@ -110,7 +111,7 @@ class ModbusClient final : public ControllerClient {
     while (out.size() < size) {
       const std::size_t n = std::min<std::size_t>((size - out.size() + 1) / 2, registers.size());
       set_number(offset, out.size());
-      ask(fmt::format("for the bytes from {} of the active set", out.size()), attempts_, [&] {
+      send(fmt::format("for the bytes from {} of the active set", out.size()), attempts_, [&] {
         return modbus_write_and_read_registers(context_.get(), map::reading_offset,
                                                static_cast<int>(offset.size()), offset.data(),
                                                map::reading_window, static_cast<int>(n), registers.data());
@@ -122,13 +123,13 @@ class ModbusClient final : public ControllerClient {
     return out;
   }
 
-  Bytes answer_probe(std::span<const std::uint8_t> request) override {
+  Bytes exchange_probe(std::span<const std::uint8_t> request) override {
     std::array<std::uint16_t, map::probe_request_registers + 1> question{};
     static_assert(map::probe_trigger == map::probe_request + map::probe_request_registers);
     set_register({question.data(), map::probe_request_registers}, request);
     question.back() = map::trigger_request;
     std::array<std::uint16_t, map::probe_response_registers> answer{};
-    ask("to answer a probe", attempts_, [&] {
+    send("to answer a probe", attempts_, [&] {
       return modbus_write_and_read_registers(
           context_.get(), map::probe_request, static_cast<int>(question.size()), question.data(),
           map::probe_response, static_cast<int>(answer.size()), answer.data());
@@ -152,7 +153,7 @@ class ModbusClient final : public ControllerClient {
 
   void open_tcp(const ModbusTcpAddress& tcp) {
     unit_ = tcp.unit;
-    // libmodbus takes an unknown host for a refused connection.
+    // libmodbus reports an unknown host as a refused connection.
     addrinfo* found = nullptr;
     const int unknown = getaddrinfo(tcp.host.c_str(), nullptr, nullptr, &found);
     if (unknown != 0) {
@@ -162,9 +163,9 @@ class ModbusClient final : public ControllerClient {
     freeaddrinfo(found);
     context_.reset(modbus_new_tcp_pi(tcp.host.c_str(), std::to_string(tcp.port).c_str()));
     if (!context_) fail_to_open(errno);
-    // TCP repeats by itself what gets lost.
+    // TCP itself repeats lost packets.
     attempts_ = 1;
-    set_timeout(options().patience);
+    set_timeout(options().response_timeout);
     modbus_set_slave(context_.get(), tcp.unit);
     if (modbus_connect(context_.get()) != 0) fail_to_open(errno);
   }
@@ -180,16 +181,17 @@ class ModbusClient final : public ControllerClient {
     // libmodbus counts from the moment at which it hands the request to the system, before the line has sent it.
     constexpr unsigned bits_per_byte = 11;
     const auto line = milliseconds(2 * map::rtu_bytes * bits_per_byte * 1000 / rtu.baud + 1);
-    set_timeout(options().patience / attempts_ + line);
+    set_timeout(options().response_timeout / attempts_ + line);
     modbus_set_slave(context_.get(), rtu.unit);
     if (modbus_connect(context_.get()) != 0) fail_to_open(errno);
-    // One master on a serial line. The lock goes with the process, however it ends.
-    const auto end = steady_clock::now() + options().patience;
+    // One master on a serial line (Modbus over Serial Line V1.02, 2.1). The kernel frees the lock when the
+    // process ends.
+    const auto end = steady_clock::now() + options().response_timeout;
     while (flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
       if (steady_clock::now() > end) {
         throw BusError(fmt::format("{}: another program on this machine has been using {} for {:.1f} s",
                                    where(), rtu.device,
-                                   static_cast<double>(options().patience.count()) / 1000));
+                                   static_cast<double>(options().response_timeout.count()) / 1000));
       }
       std::this_thread::sleep_for(milliseconds(20));
     }
@@ -204,26 +206,26 @@ class ModbusClient final : public ControllerClient {
 
   static double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
 
-  /// One question. Exceptions of the controller become SaidNo, silence NoAnswer.
-  template <class Question>
-  void ask(const std::string& what, int attempts, const Question& question) {
+  /// One request. Exceptions of the controller become BusRefusal, a time-out NoAnswer.
+  template <class Request>
+  void send(const std::string& what, int attempts, const Request& request) {
     int error = 0;
     for (int attempt = 0; attempt < attempts; ++attempt) {
-      // An answer that came too late must not be taken for the answer to this question.
+      // A late answer must not be taken for the answer to this request.
       if (attempt != 0) modbus_flush(context_.get());
-      if (question() >= 0) return;
+      if (request() >= 0) return;
       error = errno;
       switch (error) {
         case EMBXSBUSY:
-          throw SaidNo{true, false, "Modbus exception 06, server device busy"};
+          throw BusRefusal{true, false, "Modbus exception 06, server device busy"};
         case EMBXILADD:
-          throw SaidNo{false, true, "Modbus exception 02, no such register"};
+          throw BusRefusal{false, true, "Modbus exception 02, no such register"};
         case EMBXILFUN:
-          throw SaidNo{false, true, "Modbus exception 01, no such function"};
+          throw BusRefusal{false, true, "Modbus exception 01, no such function"};
         case EMBXILVAL:
-          throw SaidNo{false, false, "Modbus exception 03, illegal value"};
+          throw BusRefusal{false, false, "Modbus exception 03, illegal value"};
         case EMBXSFAIL:
-          throw SaidNo{false, false, "Modbus exception 04, server device failure"};
+          throw BusRefusal{false, false, "Modbus exception 04, server device failure"};
         case EMBXGPATH:
         case EMBXGTAR:
           throw BusError(fmt::format("{}: the gateway cannot reach unit {} ({})", where(), unit_,
@@ -231,7 +233,7 @@ class ModbusClient final : public ControllerClient {
         default:
           break;
       }
-      // A broken connection stays broken; a damaged or missing answer is worth another question.
+      // A damaged or missing answer is worth another attempt, a broken connection is not.
       const bool damaged = error == ETIMEDOUT || (error >= EMBBADCRC && error < EMBBADCRC + 8);
       if (!damaged) break;
     }

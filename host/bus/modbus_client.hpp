@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A controller on Modbus TCP or RTU, by libmodbus (flexcomp/wire/modbus_map.hpp).
+/// Modbus TCP and RTU client of a controller, by libmodbus: registers of flexcomp/wire/modbus_map.hpp.
 #ifndef FLEXCOMP_HOST_BUS_MODBUS_CLIENT_HPP
 #define FLEXCOMP_HOST_BUS_MODBUS_CLIENT_HPP
 
@@ -10,7 +10,7 @@
 
 namespace flexcomp::host {
 
-/// `address` is one of Modbus. \throws BusError
+/// Connects to a unit. \param address  holds a ModbusTcpAddress or a ModbusRtuAddress \throws BusError
 std::unique_ptr<ControllerClient> connect_modbus(const BusAddress& address, const ClientOptions& options);
 
 }  // namespace flexcomp::host

@@ -42,7 +42,40 @@ constexpr unsigned toggle_bit = 0x10;
 constexpr std::size_t in_segment = 7;
 constexpr std::size_t in_expedited = 4;
 
-/// No object of ours is longer; a server that sends without end is stopped.
+struct AbortCode {
+  std::uint32_t code;
+  const char* text;
+};
+
+// CiA 301, table 22.
+constexpr std::array abort_codes = std::to_array<AbortCode>({
+    {0x05030000, "toggle bit not alternated"},
+    {0x05040000, "SDO protocol timed out"},
+    {0x05040001, "command specifier not valid or unknown"},
+    {0x05040005, "out of memory"},
+    {0x06010000, "unsupported access to an object"},
+    {0x06010001, "attempt to read a write-only object"},
+    {0x06010002, "attempt to write a read-only object"},
+    {0x06020000, "object does not exist"},
+    {0x06040043, "general parameter incompatibility"},
+    {0x06040047, "general internal incompatibility in the device"},
+    {0x06060000, "access failed due to a hardware error"},
+    {0x06070010, "data type or length does not match"},
+    {0x06070012, "data type does not match, length too high"},
+    {0x06070013, "data type does not match, length too low"},
+    {0x06090011, "sub-index does not exist"},
+    {0x06090030, "invalid value"},
+    {0x06090031, "value too high"},
+    {0x06090032, "value too low"},
+    {0x060A0023, "resource not available"},
+    {0x08000000, "general error"},
+    {0x08000020, "data cannot be transferred or stored"},
+    {0x08000021, "data cannot be transferred or stored because of local control"},
+    {0x08000022, "data cannot be transferred or stored because of the present device state"},
+    {0x08000024, "no data available"},
+});
+
+/// Limit of an upload, bytes: a server that sends without end is stopped.
 constexpr std::size_t longest = std::size_t{1} << 24U;
 
 void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
@@ -55,84 +88,10 @@ void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
 std::string ObjectAddress::text() const { return fmt::format("0x{:04X}:{}", index, sub); }
 
 std::string abort_text(std::uint32_t code) {
-  const char* words = "unknown abort code";
-  switch (code) {
-    case 0x05030000:
-      words = "toggle bit not alternated";
-      break;
-    case 0x05040000:
-      words = "SDO protocol timed out";
-      break;
-    case 0x05040001:
-      words = "command specifier not valid or unknown";
-      break;
-    case 0x05040005:
-      words = "out of memory";
-      break;
-    case 0x06010000:
-      words = "unsupported access to an object";
-      break;
-    case 0x06010001:
-      words = "attempt to read a write-only object";
-      break;
-    case 0x06010002:
-      words = "attempt to write a read-only object";
-      break;
-    case 0x06020000:
-      words = "object does not exist";
-      break;
-    case 0x06040043:
-      words = "general parameter incompatibility";
-      break;
-    case 0x06040047:
-      words = "general internal incompatibility in the device";
-      break;
-    case 0x06060000:
-      words = "access failed due to a hardware error";
-      break;
-    case 0x06070010:
-      words = "data type or length does not match";
-      break;
-    case 0x06070012:
-      words = "data type does not match, length too high";
-      break;
-    case 0x06070013:
-      words = "data type does not match, length too low";
-      break;
-    case 0x06090011:
-      words = "sub-index does not exist";
-      break;
-    case 0x06090030:
-      words = "invalid value";
-      break;
-    case 0x06090031:
-      words = "value too high";
-      break;
-    case 0x06090032:
-      words = "value too low";
-      break;
-    case 0x060A0023:
-      words = "resource not available";
-      break;
-    case 0x08000000:
-      words = "general error";
-      break;
-    case 0x08000020:
-      words = "data cannot be transferred or stored";
-      break;
-    case 0x08000021:
-      words = "data cannot be transferred or stored because of local control";
-      break;
-    case 0x08000022:
-      words = "data cannot be transferred or stored because of the present device state";
-      break;
-    case 0x08000024:
-      words = "no data available";
-      break;
-    default:
-      break;
-  }
-  return fmt::format("SDO abort {:04X} {:04X}, {}", code >> 16U, code & 0xFFFFU, words);
+  const auto* const known = std::find_if(abort_codes.begin(), abort_codes.end(),
+                                         [code](const AbortCode& entry) { return entry.code == code; });
+  return fmt::format("SDO abort {:04X} {:04X}, {}", code >> 16U, code & 0xFFFFU,
+                     known != abort_codes.end() ? known->text : "unknown abort code");
 }
 
 SdoAbort::SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server)
@@ -214,7 +173,7 @@ SdoClient::Payload SdoClient::exchange(const Payload& request, ObjectAddress obj
     }
     const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
     if (answer[0] == aborted) {
-      // Late news of a transfer that was given up is not about this one.
+      // A late abort of an earlier transfer names another object.
       if (!same_object) continue;
       throw SdoAbort(object, load_u32(answer.data() + 4), true);
     }
@@ -227,8 +186,8 @@ void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> dat
   drain();
   Payload frame{};
   address(frame, object);
-  const bool short_one = !data.empty() && data.size() <= in_expedited;
-  if (short_one) {
+  const bool is_expedited = !data.empty() && data.size() <= in_expedited;
+  if (is_expedited) {
     const auto unused = static_cast<unsigned>(in_expedited - data.size());
     frame[0] = static_cast<std::uint8_t>(download_initiate | (unused << 2U) | expedited | size_indicated);
     std::copy(data.begin(), data.end(), frame.begin() + 4);
@@ -238,7 +197,7 @@ void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> dat
   }
   const Payload initiated = exchange(frame, object, true);
   if ((initiated[0] & specifier_mask) != download_initiated) abort(object, co::abort::command);
-  if (short_one) return;
+  if (is_expedited) return;
 
   unsigned toggle = 0;
   std::size_t at = 0;
@@ -293,7 +252,7 @@ std::vector<std::uint8_t> SdoClient::upload_segments(ObjectAddress object, std::
     if (progress) progress(out.size(), is_announced ? announced : out.size());
   }
   if (is_announced && out.size() != announced) {
-    // The server has ended the transfer: there is nothing left to abort.
+    // The server has ended the transfer: there is nothing to abort.
     throw SdoAbort(object, co::abort::too_short, false);
   }
   return out;

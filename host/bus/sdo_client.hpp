@@ -23,7 +23,7 @@ struct ObjectAddress {
   std::string text() const;  ///< 0x1018:1
 };
 
-/// The server ended a transfer, or this client did because the answer made no sense.
+/// SDO abort transfer (CiA 301, 7.2.4.3), by the server, or by this client after an invalid answer.
 class SdoAbort : public std::runtime_error {
  public:
   SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server);
@@ -40,19 +40,20 @@ class SdoTimeout : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What an abort code says (CiA 301, table 22): "0604 0043: general parameter incompatibility".
+/// Text of an abort code (CiA 301, table 22): "SDO abort 0604 0043, general parameter incompatibility".
 std::string abort_text(std::uint32_t code);
 
 class SdoClient {
  public:
   using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
-  /// `socket` gives and takes one struct can_frame per read and write; it stays the caller's. `timeout` holds for each
-  /// answer of the server.
+  /// \param socket   one struct can_frame per read and write; owned by the caller
+  /// \param timeout  limit of each answer of the server
   SdoClient(int socket, std::uint8_t node, std::chrono::milliseconds timeout);
 
-  /// \throws SdoAbort, SdoTimeout, std::system_error
+  /// Reads an object: expedited or segmented upload (CiA 301, 7.2.4.3). \throws SdoAbort, SdoTimeout, std::system_error
   std::vector<std::uint8_t> upload(ObjectAddress object, const Progress& progress = {});
+  /// Writes an object: expedited up to 4 bytes, else segmented download (CiA 301, 7.2.4.3). Throws as upload().
   void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {});
 
  private:

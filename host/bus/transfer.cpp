@@ -19,10 +19,10 @@
 namespace flexcomp::host {
 namespace {
 
-/// What an image asks of a controller.
-struct Demands {
+/// Requirements of an image, collected record by record.
+struct Requirements {
   std::set<unsigned> bases;
-  std::size_t moving_terms = 0;  ///< constant ones are folded and cost nothing
+  std::size_t variable_terms = 0;  ///< constant ones are folded into the nominal chain
   std::size_t tables = 0;
   std::size_t values = 0;
 
@@ -33,7 +33,7 @@ struct Demands {
   }
   Refusal term(const Term<double>& t) {
     bases.insert(static_cast<unsigned>(t.basis));
-    if (!is_constant(t)) ++moving_terms;
+    if (!is_constant(t)) ++variable_terms;
     return Refusal::none;
   }
 };
@@ -46,27 +46,27 @@ std::vector<std::string> beyond_capability(const wire::Capability& capability,
                                            std::span<const std::uint8_t> image) {
   std::vector<std::string> out;
   ImageHeader header;
-  Demands asks;
+  Requirements required;
   Refusal refusal = read_header(image.data(), image.size(), header);
-  if (refusal == Refusal::none) refusal = visit_image<double>(image.data(), image.size(), asks);
+  if (refusal == Refusal::none) refusal = visit_image<double>(image.data(), image.size(), required);
   if (refusal != Refusal::none) return {text(refusal)};
   if (capability.schema >> 8U != header.schema_major) {
     out.push_back(fmt::format("the image has schema {}.{}, the controller knows {}.x", header.schema_major,
                               header.schema_minor, capability.schema >> 8U));
   }
-  for (const unsigned basis : asks.bases) {
+  for (const unsigned basis : required.bases) {
     if (basis >= 32 || (capability.bases >> basis & 1U) == 0) {
       out.push_back(fmt::format("basis {} is not known to the controller", basis));
     }
   }
-  const auto room = [&out](std::size_t needed, std::size_t there, const char* what) {
+  const auto require = [&out](std::size_t needed, std::size_t there, const char* what) {
     if (needed > there)
       out.push_back(fmt::format("{} {} are needed, the controller holds {}", needed, what, there));
   };
-  room(asks.moving_terms, capability.terms, "terms that are not constant");
-  room(asks.tables, capability.tables, "tables");
-  room(asks.values, capability.values, "table values");
-  room(image.size(), capability.image_bytes, "bytes");
+  require(required.variable_terms, capability.terms, "terms that are not constant");
+  require(required.tables, capability.tables, "tables");
+  require(required.values, capability.values, "table values");
+  require(image.size(), capability.image_bytes, "bytes");
   return out;
 }
 
@@ -89,12 +89,12 @@ void push_image(ControllerClient& client, std::span<const std::uint8_t> image, c
       client.run(wire::Command::commit);
     }
   } catch (const RefusedByController& e) {
-    // What is staged belongs to somebody else where the controller is busy.
+    // In a busy controller the staging area belongs to another client.
     if (e.answer() != wire::Answer::busy) {
       try {
         client.run(wire::Command::abort);
       } catch (const BusError&) {
-        // The first error is the one to tell; the controller drops what is staged by itself after a while.
+        // The first error is reported; the controller drops a stale staging area by its own time limit.
       }
     }
     throw;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A parameter set on its way into a controller and out of it.
+/// Transfer of parameter sets to and from a controller.
 #ifndef FLEXCOMP_HOST_BUS_TRANSFER_HPP
 #define FLEXCOMP_HOST_BUS_TRANSFER_HPP
 
@@ -17,36 +17,38 @@
 
 namespace flexcomp::host {
 
-/// What this controller could not do with a well-formed image, each a sentence without a full stop; empty where
-/// nothing stands against sending it. Who the image is for is not looked at.
+/// Lists the requirements of a well-formed image (schema, bases, capacities) that a controller does not meet,
+/// one sentence without full stop each. The robot that the image is bound to is not compared.
 std::vector<std::string> beyond_capability(const wire::Capability& capability,
                                            std::span<const std::uint8_t> image);
 
-/// One more than the newest set that the controller has. \throws BusError where there is no higher number
+/// Next sequence number: one above the newest set of the controller. \throws BusError where 2^32 - 1 is reached
 std::uint32_t next_sequence(ControllerClient& client);
 
 struct PushOptions {
-  std::optional<std::uint32_t> trial_cycles;  ///< on trial; 0: as long as the controller is configured
+  std::optional<std::uint32_t> trial_cycles;  ///< commit on trial; 0: the controller's default
   Progress progress;
 };
 
-/// Stages, verifies, commits, reads back and compares byte for byte. Whatever is refused or fails before the commit
-/// leaves the controller as it was.
+/// Stages, verifies and commits an image, reads it back and compares all bytes. A refusal or failure before the commit
+/// leaves the controller's sets unchanged. \throws BusError
 void push_image(ControllerClient& client, std::span<const std::uint8_t> image,
                 const PushOptions& options = {});
 
-/// The robot that a set is made for or read for: of a file where one is given (it must be the controller's), else as
-/// the controller tells it. \throws BusError where it is another one, or where neither says
+/// Nominal robot of a controller: from `robot_path`, verified by the controller's hashes, or from its robot record.
+/// \throws BusError  another robot or geometry; no path given and no robot record
+/// \throws InputError  as load_robot()
 Robot robot_of(ControllerClient& client, const std::string& robot_path);
 
-/// Reads a calibration that is meant for this controller. \throws BusError where the file names another robot or
-/// geometry than the controller's, InputError as load_calibration()
+/// Reads a calibration file and verifies its robot and nominal hash against the controller's.
+/// \throws BusError  another robot or geometry
+/// \throws InputError  as load_calibration()
 Calibration load_calibration_for(ControllerClient& client, const std::string& path, const Robot& robot);
 
-/// The active set. \throws BusError where there is none or its bytes are damaged
+/// Reads and checks the active image. \throws BusError  none active, or damaged bytes
 Bytes pull_image(ControllerClient& client, const Progress& progress = {});
 
-/// The bytes of a file if they are a parameter image, which begins with "FLXC". \throws InputError
+/// Reads a parameter image, a file that begins with "FLXC"; nothing for other files. \throws InputError
 std::optional<Bytes> read_image_file(const std::string& path);
 
 }  // namespace flexcomp::host

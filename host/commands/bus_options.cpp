@@ -30,7 +30,7 @@ void BusOptions::add_bus_to(CLI::App& app, const std::string& name) {
 
 std::unique_ptr<ControllerClient> BusOptions::connect() const {
   ClientOptions options;
-  options.patience = std::chrono::milliseconds(static_cast<long>(timeout_s * 1000));
+  options.response_timeout = std::chrono::milliseconds(static_cast<long>(timeout_s * 1000));
   return host::connect(bus, options);
 }
 

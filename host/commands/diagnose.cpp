@@ -119,7 +119,7 @@ void Diagnose::run() const {
     warnings.insert(warnings.end(), other.warnings.begin(), other.warnings.end());
     other_rows = observe(other, robot_file, &warnings);
     if (!force)
-      refuse_the_implausible(robot_file, other_rows, holdout, errors_before(robot_file, other_rows));
+      require_plausible_residuals(robot_file, other_rows, holdout, errors_before(robot_file, other_rows));
     const std::vector<std::string> missing = missing_columns(file, other);
     if (!missing.empty()) {
       warnings.push_back(

@@ -90,7 +90,7 @@ struct Row {
 
 std::vector<Row> rows_of(const Identification& r) {
   std::vector<Row> rows;
-  const Unknowns& fitted = r.known.fitted;
+  const Unknowns& fitted = r.identifiability.fitted;
   const Eigen::VectorXd units = units_of(fitted, r.fit.estimate.set);
   for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
     const Parameter& parameter = fitted.parameters[p];
@@ -185,17 +185,15 @@ void Identify::run() const {
   common.warn(warnings);
   save_calibration(out, r.calibration, robot_file);
 
-  common.say(fmt::format("{}: {} rows of {}; {} of {} parameters are identifiable{}", data, rows.size(),
-                         robot_file.name, r.identifiable, r.parameters,
-                         r.frame_parameters > 0
-                             ? fmt::format(", and {} numbers of the frames", r.frame_parameters)
-                             : std::string()));
-  for (const Confounded& c : r.known.confounded) {
+  common.say(fmt::format(
+      "{}: {} rows of {}; {} of {} parameters are identifiable{}", data, rows.size(), robot_file.name,
+      r.identifiable, r.parameters,
+      r.frame_parameters > 0 ? fmt::format(", and {} frame parameters", r.frame_parameters) : std::string()));
+  for (const Confounded& c : r.identifiability.confounded) {
     std::string with;
     for (const std::string& w : c.with) with += (with.empty() ? "" : ", ") + w;
-    common.say(
-        fmt::format("  {} cannot be known: {}", c.parameter,
-                    with.empty() ? "nothing measured here depends on it" : "it is carried by " + with));
+    common.say(fmt::format("  {} not identifiable: {}", c.parameter,
+                           with.empty() ? "nothing measured here depends on it" : "absorbed by " + with));
   }
   const std::vector<Row> table = rows_of(r);
   common.say(parameter_table(table));
@@ -207,8 +205,9 @@ void Identify::run() const {
   common.say(fmt::format("{}: written", out));
 
   if (r.pure_error) common.say(repeats_text(*r.pure_error));
-  if (!r.known.payload_gains.empty())
-    common.say(payload_advice(r.known.payload_gains, r.fit.estimate.set, r.known.fitted.parameters));
+  if (!r.identifiability.payload_gains.empty())
+    common.say(payload_advice(r.identifiability.payload_gains, r.fit.estimate.set,
+                              r.identifiability.fitted.parameters));
 
   nlohmann::ordered_json parameters = nlohmann::ordered_json::array();
   for (const Row& row : table) {
@@ -221,21 +220,21 @@ void Identify::run() const {
   }
   nlohmann::ordered_json cure = nlohmann::ordered_json::array();
   nlohmann::ordered_json cure_payload = nlohmann::ordered_json::array();
-  for (const SuggestedPose& c : r.known.cure) {
+  for (const SuggestedPose& c : r.identifiability.suggested_poses) {
     nlohmann::ordered_json pose = nlohmann::ordered_json::array();
     for (const double v : c.q_rad) pose.push_back(degrees(v));
     cure.push_back(pose);
     cure_payload.push_back(c.payload_kg);
   }
   nlohmann::ordered_json gains = nlohmann::ordered_json::array();
-  for (const PayloadGain& gain : r.known.payload_gains)
+  for (const PayloadGain& gain : r.identifiability.payload_gains)
     gains.push_back({{"parameter", gain.parameter}, {"sigma_ratio", gain.sigma_with_both / gain.sigma}});
   std::vector<std::size_t> outlier_lines;
   for (const std::size_t k : r.outliers) outlier_lines.push_back(rows[k].line);
   common.write_json({{"parameters", r.parameters},
                      {"identifiable", r.identifiable},
-                     {"confounded", confounded_json(r.known.confounded)},
-                     {"missing", r.known.missing},
+                     {"confounded", confounded_json(r.identifiability.confounded)},
+                     {"missing", r.identifiability.missing},
                      {"cure_deg", cure},
                      {"cure_payload_kg", cure_payload},
                      {"second_payload_gains", gains},
@@ -261,10 +260,10 @@ void Identify::run() const {
   }
   if (r.doubts.empty()) return;
   std::string message = joined(r.doubts);
-  if (!r.known.cure.empty()) {
-    message += fmt::format("\n  These {} poses (joint readings in degrees, payload) would cure it:",
-                           r.known.cure.size());
-    for (const SuggestedPose& c : r.known.cure)
+  if (!r.identifiability.suggested_poses.empty()) {
+    message += fmt::format("\n  These {} poses (joint readings in degrees, payload) would identify them:",
+                           r.identifiability.suggested_poses.size());
+    for (const SuggestedPose& c : r.identifiability.suggested_poses)
       message += fmt::format("\n   {}  {:.3f} kg", in_degrees(c.q_rad), c.payload_kg);
   }
   throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, message));

@@ -221,11 +221,11 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   common.say(fmt::format("{}: {} rows, {} of {} joined with {} by {}", out, joining.data.rows.size(), kind,
                          source, joints, by.empty() ? "name" : by));
   common.say(fmt::format(
-      "  {}: {} points in {}, fields parted by {}{}", source, points.points.size(), points.length.name,
+      "  {}: {} points in {}, fields separated by {}{}", source, points.points.size(), points.length.name,
       words(points.dialect),
       points.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(points.unused, ", "))));
   common.say(
-      fmt::format("  {}: {} rows, joints {}, fields parted by {}{}", joints, log.rows.size(),
+      fmt::format("  {}: {} rows, joints {}, fields separated by {}{}", joints, log.rows.size(),
                   fmt::join(log.joint_columns, " "), words(log.dialect),
                   log.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(log.unused, ", "))));
   list(common, fmt::format("points of {} without joint readings, left out", source), joining.lonely_points);

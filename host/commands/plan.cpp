@@ -263,7 +263,7 @@ void Plan::check_number(const Robot& robot_file) {
         fmt::format("{} {} of kind '{}' cannot know {} parameters{} of {}; the least number is {}", poses,
                     poses == 1 ? "pose" : "poses", measure, problem_.information->parameters(),
                     problem_.information->nuisance() > 0
-                        ? fmt::format(" and {} numbers of the frames", problem_.information->nuisance())
+                        ? fmt::format(" and {} frame parameters", problem_.information->nuisance())
                         : "",
                     robot_file.name, *least));
   }
@@ -443,7 +443,7 @@ void Plan::run() {
                                                            like, common.seed);
   std::vector<Block> known(known_.size());
   for (std::size_t k = 0; k < known_.size(); ++k) problem_.information->block(known_[k], known[k]);
-  problem_.take_as_known(std::move(known));
+  problem_.set_measured(std::move(known));
   check_number(robot_file);
   common.warn(warnings_);
 
@@ -479,30 +479,29 @@ void Plan::run() {
   std::sort(worst.begin(), worst.end(), [](const Sigma& a, const Sigma& b) { return a.units > b.units; });
 
   const double fitness = criterion.fitness(exact.figures);
-  common.say(
-      fmt::format("{}: {} poses of {} by {}{}; {} of {} parameters can be known{}", out, set.size(),
-                  robot_file.name, method, stopped_ ? ", STOPPED before the end" : "",
-                  problem_.information->parameters(), problem_.information->parameters_of_model(),
-                  problem_.information->nuisance() > 0
-                      ? fmt::format(", beside {} numbers of the frames", problem_.information->nuisance())
-                      : ""));
+  common.say(fmt::format("{}: {} poses of {} by {}{}; {} of {} parameters are identifiable{}", out,
+                         set.size(), robot_file.name, method, stopped_ ? ", STOPPED before the end" : "",
+                         problem_.information->parameters(), problem_.information->parameters_of_model(),
+                         problem_.information->nuisance() > 0
+                             ? fmt::format(", beside {} frame parameters", problem_.information->nuisance())
+                             : ""));
   common.say(fmt::format(
       "  criterion {:.6g} (expected Omin {:.6g} / O1 {:.6g}); random poses: {:.6g} (median of "
       "{} sets), {:.2f} times as large",
       fitness, exact.figures.trace, criterion.o1(exact.figures), median, random.size(), median / fitness));
   std::optional<Figures> before;
-  if (!problem_.known.empty()) {
-    const ExactFigures alone = exact_figures(problem_.known, problem_.information->nuisance());
+  if (!problem_.measured.empty()) {
+    const ExactFigures alone = exact_figures(problem_.measured, problem_.information->nuisance());
     Criterion of_known = criterion;
-    of_known.poses = static_cast<double>(problem_.known.size());
+    of_known.poses = static_cast<double>(problem_.measured.size());
     if (alone.full_rank) {
       before = alone.figures;
       common.say(fmt::format("  {} alone ({} poses): criterion {:.6g} (expected Omin {:.6g} / O1 {:.6g})",
-                             extend, problem_.known.size(), of_known.fitness(*before), before->trace,
+                             extend, problem_.measured.size(), of_known.fitness(*before), before->trace,
                              of_known.o1(*before)));
     } else {
       common.say(fmt::format("  {} alone ({} poses) does not know all of these parameters", extend,
-                             problem_.known.size()));
+                             problem_.measured.size()));
     }
   }
   std::vector<std::size_t> at_payload(problem_.payloads.size(), 0);
@@ -522,7 +521,7 @@ void Plan::run() {
   }
   common.say(fmt::format("  {:.1f} % of the poses within the joint limits are allowed{}",
                          100.0 * static_cast<double>(allowed_) / sampled_poses, reasons));
-  common.say("  least known (1 sigma to expect):");
+  common.say("  least certain (1 sigma to expect):");
   for (std::size_t k = 0; k < std::min<std::size_t>(5, worst.size()); ++k) {
     common.say(fmt::format("    {:<40} {:.3g}", worst[k].name, worst[k].value));
   }
@@ -564,10 +563,10 @@ void Plan::run() {
     refused[name_of(obstruction)] = static_cast<double>(count) / sampled_poses;
   }
   if (!extend.empty()) {
-    nlohmann::ordered_json known_json{{"poses", problem_.known.size()}, {"known", before.has_value()}};
+    nlohmann::ordered_json known_json{{"poses", problem_.measured.size()}, {"known", before.has_value()}};
     if (before) {
       Criterion of_known = criterion;
-      of_known.poses = static_cast<double>(problem_.known.size());
+      of_known.poses = static_cast<double>(problem_.measured.size());
       known_json.update(figures_json(of_known, *before));
     }
     result["before"] = known_json;
@@ -611,8 +610,8 @@ Page Plan::page(const Robot& robot_file, const PoseSet& set, const std::vector<S
   page.facts = {{"method", method},
                 {"criterion", fmt::format("{:.6g}", fitness)},
                 {"random poses (median)", fmt::format("{:.6g}", random)},
-                {"parameters that can be known", fmt::format("{} of {}", problem_.information->parameters(),
-                                                             problem_.information->parameters_of_model())},
+                {"identifiable parameters", fmt::format("{} of {}", problem_.information->parameters(),
+                                                        problem_.information->parameters_of_model())},
                 {"measured", measure},
                 {"allowed within the limits",
                  fmt::format("{:.1f} %", 100.0 * static_cast<double>(allowed_) / sampled_poses)}};

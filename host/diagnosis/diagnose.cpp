@@ -283,7 +283,7 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
     Identification base = identify(robot, rows, source, identify_options);
     for (const std::string& d : base.doubts) out.doubts.push_back("the model at the start: " + d);
     start.fit = std::move(base.fit);
-    start.fitted = std::move(base.known.fitted);
+    start.fitted = std::move(base.identifiability.fitted);
     out.before.confounded = base.calibration.confounded;
   }
   const std::vector<Confounded> confounded = out.before.confounded;

@@ -151,7 +151,7 @@ bool is_remark(std::string_view line) {
 InputError wrong_cells(const std::string& path, const Line& line, const Dialect& dialect, std::size_t wanted,
                        std::size_t found, const char* as_in) {
   return {path, line.number, "",
-          fmt::format("{} fields parted by {}, {}", wanted, words(Dialect{dialect.delimiter, '.'}), as_in),
+          fmt::format("{} fields separated by {}, {}", wanted, words(Dialect{dialect.delimiter, '.'}), as_in),
           fmt::format("{}: '{}'", found, line.text)};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// Tables as instruments and robots write them: fields parted by comma, semicolon, tab or blanks, numbers with a decimal
-/// point or comma, lines of explanation before the table, comments between. Our own files are read by csv.hpp.
+/// \file Tables as instruments and robots write them: fields separated by comma, semicolon, tab or blanks,
+/// numbers with a decimal point or comma, lines of explanation before the table, comments between. Our own
+/// files are read by csv.hpp.
 #ifndef FLEXCOMP_HOST_EXCHANGE_DELIMITED_TEXT_HPP
 #define FLEXCOMP_HOST_EXCHANGE_DELIMITED_TEXT_HPP
 

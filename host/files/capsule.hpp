@@ -10,10 +10,10 @@ namespace flexcomp::host {
 
 class YamlField;
 
-/// A body of the robot: frame, from_mm, to_mm, radius_mm. \throws InputError
+/// Reads a body of the robot: frame, from_mm, to_mm, radius_mm. \throws InputError
 Capsule read_capsule(const YamlField& field);
 
-/// A body that stands still: the same keys, in F0; `frame` may be left out and is 0. \throws InputError
+/// Reads a fixed body: the same keys, in F0; `frame` may be absent and is 0. \throws InputError
 Capsule read_fixed_capsule(const YamlField& field);
 
 }  // namespace flexcomp::host

@@ -14,7 +14,7 @@ namespace flexcomp::host {
 
 namespace {
 
-/// One line into cells.
+/// Splits one line into cells.
 std::vector<std::string> split(std::string_view line, const std::string& path, std::size_t number) {
   std::vector<std::string> cells;
   std::size_t at = 0;

@@ -25,7 +25,7 @@ constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 constexpr std::array<const char*, 4> quaternion_names{"qw", "qx", "qy", "qz"};
 constexpr std::array<const char*, 4> reflector_names{"a", "b", "c", "d"};
 
-// Below 7 every reading could be radians: two turns and a bit.
+// Readings below 7 in all rows may be radians: 7 rad is more than a full turn.
 constexpr double suspicious_below = 7;
 constexpr std::size_t suspicious_rows = 3;
 
@@ -40,7 +40,7 @@ std::string point_name(std::size_t r, std::size_t k) {
   return fmt::format("{}{}_mm", reflector_names[r], axis_names[k]);
 }
 
-/// Every name that has a meaning in data files and targets, for hints.
+/// All column names of data files and targets, for hints.
 const std::vector<std::string>& known_names() {
   static const std::vector<std::string> all = [] {
     std::vector<std::string> names;
@@ -65,7 +65,7 @@ bool is_known(const std::string& name) {
   return std::find(known_names().begin(), known_names().end(), name) != known_names().end();
 }
 
-/// Reads the columns that data files and targets have in common, and remembers which ones it used.
+/// Reads the columns common to data files and targets, and records which ones were used.
 class ColumnReader {
  public:
   ColumnReader(CsvTable table, const Robot& robot)
@@ -178,9 +178,8 @@ class ColumnReader {
         fmt::format("norm {:.6g}", Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm()));
   }
 
-  /// Radians under names that say degrees move an arm by a few degrees only.
-  void suspect_radians(const std::array<std::size_t, joint_count>& columns,
-                       const LoadOptions& options) const {
+  /// Refuses readings in radians under names in degrees: all below 7.
+  void refuse_radians(const std::array<std::size_t, joint_count>& columns, const LoadOptions& options) const {
     if (options.force || table_.rows.size() < suspicious_rows) return;
     double largest = 0;
     for (const CsvRow& row : table_.rows) {
@@ -194,8 +193,8 @@ class ColumnReader {
             largest, table_.rows.size()));
   }
 
-  /// Columns that mean nothing here, with a warning each. What has a meaning elsewhere (a measured position beside
-  /// joints that are all that is asked for) is left out silently: it would be wrong beside what is answered.
+  /// Lists unknown columns, with a warning each. Known columns that are not used (a measured position where
+  /// only joints are read) are left out without one.
   std::vector<std::size_t> unknown(std::vector<std::string>& names,
                                    std::vector<std::string>& warnings) const {
     std::vector<std::size_t> columns;
@@ -240,7 +239,7 @@ class ColumnReader {
       m.context.direction[j] = sign;
       largest = std::max(largest, std::abs(m.move_rad[j]));
     }
-    // The speed relative to the fastest joint is known only where every joint's motion is.
+    // The speed relative to the fastest joint needs the motion of every joint.
     if (!all || largest == 0) return;
     for (std::size_t j = 0; j < joint_count; ++j) m.context.relative_speed[j] = m.move_rad[j] / largest;
   }
@@ -253,7 +252,7 @@ class ColumnReader {
   std::array<Column, joint_count> move_, direction_;
 };
 
-/// What was measured, by the columns that are there.
+/// Measured columns of a file.
 struct MeasuredColumns {
   MeasurementKind kind = MeasurementKind::joints;
   std::array<std::size_t, 3> position{};
@@ -312,8 +311,8 @@ void read_measured(const ColumnReader& reader, const CsvRow& row, const Measured
   }
 }
 
-/// Refuses a row that repeats another one in all its values. A pose measured twice differs at least in its noise; the
-/// same row twice is a copying error that would count as independent evidence.
+/// Refuses a row that equals another one in all values. A repeated measurement differs in its noise; an equal row is a
+/// copying error that would count as independent data.
 void refuse_repeats(const CsvTable& table) {
   std::unordered_map<std::string, std::size_t> seen;
   for (const CsvRow& row : table.rows) {
@@ -343,7 +342,7 @@ MeasuredData load(const std::string& path, const Robot& robot, const LoadOptions
   const std::vector<std::size_t> extra = reader.unknown(data.extra, data.warnings);
   const CsvTable& table = reader.table();
   if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
-  reader.suspect_radians(joints, options);
+  reader.refuse_radians(joints, options);
   for (const CsvRow& row : table.rows) {
     Measurement m;
     m.line = row.line;
@@ -497,7 +496,7 @@ TargetsFile load_targets(const std::string& path, const Robot& robot, const Load
   const std::vector<std::size_t> extra = reader.unknown(targets.extra, targets.warnings);
   const CsvTable& table = reader.table();
   if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
-  reader.suspect_radians(joints, options);
+  reader.refuse_radians(joints, options);
   for (const CsvRow& row : table.rows) {
     Measurement m;
     reader.read_joints(row, joints, m.q_rad, targets.poses);

@@ -15,12 +15,11 @@
 
 namespace flexcomp::host {
 
-/// A reading that was written with few digits may lie beyond a joint limit by that rounding, not more.
+/// Tolerance of joint limits for readings that were rounded when written, rad.
 constexpr double limit_tolerance_rad = 1e-9;
 
 struct LoadOptions {
-  bool force =
-      false;  ///< go on where the file is only suspicious (radians for degrees); never where it is wrong
+  bool force = false;  ///< accept suspicious values (radians for degrees); invalid ones are always refused
 };
 
 /// Reads measured data (docs/files.md, data file).
@@ -31,10 +30,10 @@ struct LoadOptions {
 ///                     more (suspicion of radians; not where options.force)
 MeasuredData load_data(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
-/// The same, for files of which only joints and context are used: measured columns may be absent, rows may repeat.
+/// Reads joints and context: as load_data(), but measured columns may be absent and rows may repeat.
 MeasuredData load_joints(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
-/// The text of a data file: reads back to the identical doubles (contexts' defaults are not written).
+/// Formats a data file, from which the identical doubles are read back. Default contexts are not written.
 std::string data_text(const MeasuredData& data);
 
 /// Writes data_text() atomically. \throws std::runtime_error where the file cannot be written
@@ -43,11 +42,12 @@ void save_data(const std::string& path, const MeasuredData& data);
 /// Names of the context columns: payload_kg, move1_deg …, temp_c, fx_n …; not time_s.
 const std::vector<std::string>& context_names();
 
-/// A column of this name holds the instrument's name of the point: passed through without a warning.
+/// Column with the instrument's name of the point: passed through without a warning.
 constexpr const char* point_label = "point";
 
-/// Names and cells of joints and context as in a data file, for files that begin with the same columns.
+/// Names of the joint and context columns, for files that begin with them.
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns);
+/// Cells of these columns.
 std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row);
 
 /// A target of compensation: joint command or tool pose.
@@ -68,8 +68,8 @@ struct TargetsFile {
   std::vector<std::string> warnings;
 };
 
-/// Reads targets: joint commands, or poses with seeds. A joint command beyond a limit is not refused here: that is the
-/// controller's answer, given per row.
+/// Reads targets: joint commands, or poses with seeds. Joint commands beyond a limit are accepted: the
+/// controller's status reports them per row.
 /// \throws InputError  as load_data(), and for a pose without seeds
 TargetsFile load_targets(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 

@@ -24,7 +24,7 @@ std::string read_file(const std::string& path) {
   std::string content;
   std::array<char, 65536> buffer;
   std::size_t got = 0;
-  // A directory opens, and says what it is when it is read.
+  // Opening a directory succeeds; reading it fails.
   while ((got = std::fread(buffer.data(), 1, buffer.size(), file.get())) > 0)
     content.append(buffer.data(), got);
   if (std::ferror(file.get()) != 0) throw unreadable();

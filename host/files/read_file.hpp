@@ -8,7 +8,7 @@
 
 namespace flexcomp::host {
 
-/// \throws InputError  no such file, no permission, a directory, a failure while reading
+/// Reads a file completely. \throws InputError  no such file, no permission, a directory, a failure while reading
 std::string read_file(const std::string& path);
 
 }  // namespace flexcomp::host

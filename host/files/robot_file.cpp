@@ -97,7 +97,7 @@ std::string robot_text(const Robot& robot, const std::vector<std::string>& comme
   const NominalRobot<joint_count>& nominal = robot.nominal;
   std::string text;
   for (std::string line : comment) {
-    // Names come from elsewhere, and none may end the comment.
+    // Names come from other files: no line break may end the comment.
     std::replace_if(
         line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
     text += line.empty() ? "#\n" : "# " + line + "\n";

@@ -11,9 +11,8 @@
 
 namespace flexcomp::host {
 
-/// Links longer than any arm's: d that ran off. Where two axes are nearly parallel, a maker's table of calibrated
-/// Denavit-Hartenberg parameters holds hundreds of metres of d on one link and as much against it on the next; nothing can
-/// be identified from there.
+/// Limit of |d| and |a|. With nearly parallel axes a table of calibrated Denavit-Hartenberg parameters has hundreds of
+/// metres of d on one link, cancelled on the next; such a chain is too ill-conditioned for identification.
 constexpr double longest_link_m = 20;
 enum class LongLinks { refused, taken };
 
@@ -23,11 +22,11 @@ enum class LongLinks { refused, taken };
 ///                     whose norm is off 1 by more than 1e-3; |d| or |a| above longest_link_m
 Robot load_robot(const std::string& path, LongLinks long_links = LongLinks::refused);
 
-/// The same from the text of a robot file; `name` stands for its path in messages.
+/// Parses the text of a robot file. \param name  its path in messages
 Robot parse_robot(const std::string& text, const std::string& name);
 
-/// A robot file from which load_robot() gives the identical robot back; what is unknown or absent is left out. `comment`
-/// goes before it, as lines without their #.
+/// Formats a robot file, from which load_robot() reads the identical robot; unknown and absent values are left out.
+/// \param comment  lines before it, without their #
 std::string robot_text(const Robot& robot, const std::vector<std::string>& comment);
 
 }  // namespace flexcomp::host

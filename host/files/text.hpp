@@ -9,10 +9,10 @@
 
 namespace flexcomp::host {
 
-/// Without blanks and tabs at both ends.
+/// Removes blanks and tabs at both ends.
 std::string_view trimmed(std::string_view text);
 
-/// ASCII letters in lower case; other bytes as they are.
+/// Converts ASCII letters to lower case; other bytes stay.
 std::string lower(std::string_view text);
 
 }  // namespace flexcomp::host

@@ -13,7 +13,7 @@ namespace flexcomp::host {
 
 namespace {
 
-/// `*` stands for any text, also none.
+/// Matches a pattern in which * is any text, also none.
 bool matches(std::string_view pattern, std::string_view name) {
   const std::size_t star = pattern.find('*');
   if (star == std::string_view::npos) return pattern == name;

@@ -77,7 +77,7 @@ Destination found_destination(const std::string& path) {
   }
 }
 
-/// Beside the target, and renamed to it.
+/// Writes a temporary file beside the target and renames it.
 void replace(const fs::path& target, std::string_view content, const std::string& path) {
   struct stat old {};
   const bool there = ::stat(target.c_str(), &old) == 0;
@@ -87,7 +87,7 @@ void replace(const fs::path& target, std::string_view content, const std::string
   try {
     const File file(std::fopen(temporary.c_str(), "wb"));
     if (file && there) {
-      // The owner stays where that is allowed to us.
+      // Keep the owner where permissions allow.
       if (::fchown(::fileno(file.get()), old.st_uid, old.st_gid) != 0) errno = 0;
       if (::fchmod(::fileno(file.get()), old.st_mode & 07777) != 0) fail(path, errno);
     }
@@ -114,7 +114,7 @@ fs::path written_path(const std::string& path) {
 void write_file(const std::string& path, std::string_view content) {
   const Destination to = found_destination(path);
   if (to.descriptor) {
-    // What was printed before stands before it; the descriptor keeps its place in a file that it was redirected to.
+    // Flush earlier output first; the descriptor keeps its offset in a file that it was redirected to.
     std::fflush(nullptr);
     const int copy = ::dup(*to.descriptor);
     if (copy < 0) fail(path, errno);

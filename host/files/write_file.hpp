@@ -10,14 +10,14 @@
 
 namespace flexcomp::host {
 
-/// The file that a write to `path` reaches: absolute, every symbolic link followed, also where nothing is there yet.
-/// \throws std::runtime_error  links that lead round in a circle
+/// Resolves the target of a write to `path`: absolute, all symbolic links followed; the file need not exist.
+/// \throws std::runtime_error  a cycle of links
 std::filesystem::path written_path(const std::string& path);
 
-/// Writes beside the target and renames, so that a reader never sees half a file and a failure leaves the old one. A link
-/// stays and what it points at is written; a file that is there keeps its mode, and one that is write-protected is refused.
-/// What is not a regular file (a pipe, a terminal) or lies below /dev or /proc is written to directly; /dev/stdout and
-/// /dev/fd/N are the descriptors of this process, wherever they lead.
+/// Writes a file atomically: to a temporary file beside the target, which is then renamed; a failure leaves the
+/// old file. Symbolic links are followed; an existing file keeps its mode, a write-protected one is refused.
+/// Targets that are not regular files (a pipe, a terminal) or lie below /dev or /proc are written directly;
+/// /dev/stdout and /dev/fd/N are the descriptors of this process.
 /// \throws std::runtime_error  naming the path and the system's reason
 void write_file(const std::string& path, std::string_view content);
 

@@ -18,22 +18,23 @@
 
 namespace flexcomp::host {
 
+/// YAML node with typed access; every accessor throws InputError with file, line and path.
 class YamlField {
  public:
-  /// The root of a file. \throws InputError  absent, unreadable, no YAML, empty
+  /// Loads the root of a file. \throws InputError  absent, unreadable, no YAML, empty
   static YamlField load(const std::string& path);
-  /// The root of a text; `name` stands for the file in messages. \throws InputError  no YAML, empty
+  /// Parses the root of a text. \param name  file name in messages \throws InputError  no YAML, empty
   static YamlField parse(const std::string& text, const std::string& name);
 
   std::size_t line() const;
   const std::string& path() const { return path_; }  ///< joints[3].a_mm
   const std::string& file() const { return file_; }
 
-  /// To be thrown: this field is not what was expected; what was found is described from the node.
+  /// Error of this field, to be thrown; by default `found` describes the node.
   InputError error(const std::string& expected) const;
   InputError error(const std::string& expected, const std::string& found) const;
 
-  /// A mapping without keys beyond `known` and without one twice. \throws InputError
+  /// Requires a mapping with no keys beyond `known` and none twice. \throws InputError
   void require_keys(const std::vector<std::string>& known) const;
   bool has(const std::string& key) const { return find(key).has_value(); }
   std::optional<YamlField> find(const std::string& key) const;
@@ -41,7 +42,7 @@ class YamlField {
   bool is_mapping() const { return node_.IsMap(); }
   std::vector<std::string> keys() const;  ///< of a mapping, in the order of the file
 
-  /// A sequence; items are named from 1, as joints and links are (joints[3] is joint 3). \throws InputError
+  /// Items of a sequence, counted from 1 in paths (joints[3] is joint 3). \throws InputError
   std::vector<YamlField> items() const;
 
   std::string text() const;  ///< a non-empty scalar
@@ -52,7 +53,7 @@ class YamlField {
   /// w x y z; norm within 1e-3 of 1, normalised, w >= 0
   Eigen::Quaterniond quaternion() const;
 
-  /// The same for members that may be absent.
+  /// Number of a member that may be absent.
   double number_or(const std::string& key, const Unit& unit, double otherwise) const;
 
  private:

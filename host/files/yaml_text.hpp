@@ -10,12 +10,12 @@
 
 namespace flexcomp::host {
 
-/// A number as YAML 1.1 readers also take it for one: 1e-05 is text to them, 1.0e-05 is not.
+/// Formats a number for YAML 1.1 readers, to which 1e-05 is text and 1.0e-05 a number.
 std::string yaml_number(std::string text);
-/// With the digits from which the identical double is read back.
+/// Formats a number with the digits from which the identical double is read back.
 std::string yaml_number(double si, const Unit& unit);
 
-/// In double quotes, whatever it holds.
+/// Quotes a text with double quotes and escapes.
 std::string yaml_quoted(const std::string& text);
 
 }  // namespace flexcomp::host

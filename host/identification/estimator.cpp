@@ -8,24 +8,17 @@
 
 #include "distributions.hpp"
 #include "linalg/decompositions.hpp"
+#include "identification/statistics.hpp"
 
 namespace flexcomp::host {
 
 namespace {
 
-/// Squared whitened residual of each row.
+/// Squared norm of the whitened residual of each row.
 Eigen::VectorXd squares(const Eigen::VectorXd& residual) {
   Eigen::VectorXd s(residual.size() / 6);
   for (Eigen::Index k = 0; k < s.size(); ++k) s[k] = residual.segment<6>(6 * k).squaredNorm();
   return s;
-}
-
-double dimensions(const Observation& row) { return row.has_orientation ? 6 : 3; }
-
-double median(std::vector<double> v) {
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
 }
 
 struct RobustWeights {
@@ -33,15 +26,15 @@ struct RobustWeights {
   std::vector<double> weight;  // of the squared residual, per row
 };
 
-/// The scale from the median of the rows' chi-squares, so that a third of wild rows does not move it; then full weight
-/// up to the 99.9 % quantile and quantile / square beyond.
-RobustWeights weigh(const Eigen::VectorXd& square, const std::vector<Observation>& rows,
-                    std::size_t unknowns) {
+/// Robust weights of the rows, Eq. (M39): scale from the median of their chi-squares, which a third of outliers
+/// does not change; weight 1 up to the 99.9 % quantile, quantile / square beyond.
+RobustWeights robust_weights(const Eigen::VectorXd& square, const std::vector<Observation>& rows,
+                             std::size_t unknowns) {
   std::vector<double> ratio(rows.size());
   double measured = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    ratio[k] = square[static_cast<Eigen::Index>(k)] / chi2_quantile(0.5, dimensions(rows[k]));
-    measured += dimensions(rows[k]);
+    ratio[k] = square[static_cast<Eigen::Index>(k)] / chi2_quantile(0.5, measured_numbers(rows[k]));
+    measured += measured_numbers(rows[k]);
   }
   RobustWeights out;
   // Fitted parameters take up part of the residual.
@@ -49,65 +42,67 @@ RobustWeights weigh(const Eigen::VectorXd& square, const std::vector<Observation
   out.scale = std::sqrt(std::max(median(ratio) / share, 1e-12));
   out.weight.resize(rows.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const double limit = chi2_quantile(0.999, dimensions(rows[k])) * std::max(out.scale * out.scale, 1.0);
+    const double limit =
+        chi2_quantile(0.999, measured_numbers(rows[k])) * std::max(out.scale * out.scale, 1.0);
     const double s = square[static_cast<Eigen::Index>(k)];
     out.weight[k] = s > limit ? limit / s : 1.0;
   }
   return out;
 }
 
-/// Linearised cost around an estimate, dx in units_of(): normal * dx = gradient at its minimum.
+/// Quadratic model of the objective around an estimate, dx in units_of(); its minimum solves normal * dx =
+/// gradient, Eq. (M35).
 struct Quadratic {
   Eigen::MatrixXd normal;
   Eigen::VectorXd gradient;
-  Eigen::VectorXd least;  ///< of dx; minus infinity where nothing bounds it
+  Eigen::VectorXd least;  ///< lower bound of dx, minus infinity where there is none
 
-  /// What a step gains in chi-square, as far as the cost is quadratic.
+  /// Decrease of chi-square by a step in the quadratic model.
   double gain(const Eigen::VectorXd& dx) const {
     return 2 * gradient.dot(dx) - dx.dot(normal.selfadjointView<Eigen::Lower>() * dx);
   }
 };
 
-/// Minimum within the bounds by an active set. Few parameters are bounded, so this ends after a few rounds; the limit is
-/// there for rounding that keeps one on the edge.
+/// Minimum of the damped quadratic within the bounds by an active set, Eq. (M37). Few parameters are bounded,
+/// so it ends after a few rounds; the limit of 100 guards against cycling by rounding.
 Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
   const Eigen::Index n = q.gradient.size();
   Eigen::MatrixXd damped = q.normal;
   damped.diagonal().array() += mu;
   Eigen::VectorXd dx = Ldlt(damped).solve(q.gradient);
   if ((dx.array() >= q.least.array()).all()) return dx;
-  std::vector<bool> held(static_cast<std::size_t>(n), false);
+  std::vector<bool> active(static_cast<std::size_t>(n), false);
   damped = damped.selfadjointView<Eigen::Lower>();
   for (int round = 0; round < 100; ++round) {
-    bool settled = true;
+    bool unchanged = true;
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (held[static_cast<std::size_t>(i)] || dx[i] >= q.least[i]) continue;
-      held[static_cast<std::size_t>(i)] = true;
-      settled = false;
+      if (active[static_cast<std::size_t>(i)] || dx[i] >= q.least[i]) continue;
+      active[static_cast<std::size_t>(i)] = true;
+      unchanged = false;
     }
-    if (settled) {
-      // A bound that pushes into the allowed side holds nothing back: let the worst one go.
+    if (unchanged) {
+      // Release the bound with the largest multiplier of the wrong sign.
       Eigen::Index release = n;
       double worst = 0;
       for (Eigen::Index i = 0; i < n; ++i) {
-        if (!held[static_cast<std::size_t>(i)]) continue;
-        const double push = (q.gradient[i] - damped.row(i).dot(dx)) / std::sqrt(damped(i, i));
-        if (push > worst + 1e-12) {
-          worst = push;
+        if (!active[static_cast<std::size_t>(i)]) continue;
+        const double multiplier = (q.gradient[i] - damped.row(i).dot(dx)) / std::sqrt(damped(i, i));
+        if (multiplier > worst + 1e-12) {
+          worst = multiplier;
           release = i;
         }
       }
       if (release == n) break;
-      held[static_cast<std::size_t>(release)] = false;
+      active[static_cast<std::size_t>(release)] = false;
     }
     Eigen::MatrixXd reduced = damped;
     Eigen::VectorXd right = q.gradient;
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (!held[static_cast<std::size_t>(i)]) continue;
+      if (!active[static_cast<std::size_t>(i)]) continue;
       right -= damped.col(i) * q.least[i];
     }
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (!held[static_cast<std::size_t>(i)]) continue;
+      if (!active[static_cast<std::size_t>(i)]) continue;
       reduced.row(i).setZero();
       reduced.col(i).setZero();
       reduced(i, i) = 1;
@@ -118,17 +113,18 @@ Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
   return dx.cwiseMax(q.least);
 }
 
-/// One state of the descent: an estimate with its residuals, their derivative and their squares per row.
+/// An estimate with its residuals, their derivative and their squares per row.
 struct Point {
   Estimate estimate;
   Linearised lin;
   Eigen::VectorXd square;
 };
 
-class Descent {
+/// Objective of the fit: robust weighted least squares with priors, Eq. (M34).
+class Objective {
  public:
-  Descent(const Unknowns& unknowns, const std::vector<Observation>& rows, const Robot& robot,
-          const TermSet& set)
+  Objective(const Unknowns& unknowns, const std::vector<Observation>& rows, const Robot& robot,
+            const TermSet& set)
       : unknowns_(unknowns), rows_(rows), robot_(robot), units_(units_of(unknowns, set)) {
     const Eigen::Index n = static_cast<Eigen::Index>(unknowns.count());
     precision_ = expected_ = Eigen::VectorXd::Zero(n);
@@ -162,21 +158,21 @@ class Descent {
   Quadratic quadratic(const Point& point, const std::vector<double>& weight) const {
     const Eigen::Index n = static_cast<Eigen::Index>(unknowns_.count());
     Quadratic q{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), least_ - values(point.estimate)};
-    // Row by row over the columns that it has: of a curve's coefficients a pose touches four.
-    std::vector<Eigen::Index> touched;
+    // Row by row over its non-zero columns: a pose depends on four coefficients of a curve.
+    std::vector<Eigen::Index> columns;
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       const auto block = point.lin.derivative.middleRows<6>(6 * static_cast<Eigen::Index>(k));
-      touched.clear();
+      columns.clear();
       for (Eigen::Index c = 0; c < n; ++c) {
-        if ((block.col(c).array() != 0).any()) touched.push_back(c);
+        if ((block.col(c).array() != 0).any()) columns.push_back(c);
       }
       const Vector6<double> residual =
           weight[k] * point.lin.residual.segment<6>(6 * static_cast<Eigen::Index>(k));
-      for (std::size_t i = 0; i < touched.size(); ++i) {
-        const Vector6<double> column = block.col(touched[i]);
-        q.gradient[touched[i]] += column.dot(residual);
+      for (std::size_t i = 0; i < columns.size(); ++i) {
+        const Vector6<double> column = block.col(columns[i]);
+        q.gradient[columns[i]] += column.dot(residual);
         for (std::size_t j = 0; j <= i; ++j)
-          q.normal(touched[i], touched[j]) += weight[k] * column.dot(block.col(touched[j]));
+          q.normal(columns[i], columns[j]) += weight[k] * column.dot(block.col(columns[j]));
       }
     }
     q.normal.diagonal() += precision_;
@@ -187,7 +183,7 @@ class Descent {
   Point moved(const Point& from, const Eigen::VectorXd& dx) const {
     Estimate estimate = from.estimate;
     move(estimate, unknowns_, dx);
-    // What the step put on a bound lies on it, not a rounding beside it.
+    // A value that the step put on a bound lies on it exactly.
     for (std::size_t p = 0; p < unknowns_.parameters.size(); ++p) {
       const double least = unknowns_.prior_of(p).least;
       if (unknowns_.parameters[p].get(estimate.set) < least) unknowns_.parameters[p].set(estimate.set, least);
@@ -201,10 +197,15 @@ class Descent {
     return unknowns_.parameters[parameter].get(estimate.set) - least < 1e-9 * units_[i];
   }
 
+  RobustWeights weights(const Point& point) const {
+    return robust_weights(point.square, rows_, unknowns_.count());
+  }
+
+  std::size_t rows() const { return rows_.size(); }
   double unit(Eigen::Index i) const { return units_[i]; }
 
  private:
-  /// In units; of the frames, which have no prior, zero.
+  /// Parameter values in units_of(); zero for the frames, which have no prior.
   Eigen::VectorXd values(const Estimate& estimate) const {
     Eigen::VectorXd v = Eigen::VectorXd::Zero(units_.size());
     const Eigen::Index frames = static_cast<Eigen::Index>(unknowns_.frames.size());
@@ -224,10 +225,10 @@ class Descent {
   Eigen::VectorXd least_;
 };
 
-/// 95 % of a normal distribution above `least`: symmetric in probability, or from `least` up.
+/// 95 % interval of a normal distribution truncated at `least`, Eq. (M41): equal tails, or from `least` up.
 Interval allowed_interval(double mean, double sigma, double least, bool from_the_bound) {
   if (!(sigma > 0)) return {mean, mean};
-  // Share of the distribution that is allowed; upper tails, because a mean far below the bound leaves 1e-20 of it.
+  // Probability above the bound, by upper tails: a mean far below the bound leaves 1e-20.
   const double allowed = normal_above((least - mean) / sigma);
   const auto with_above = [&](double tail) {
     const double p = std::max(allowed * tail, 1e-300);
@@ -237,7 +238,7 @@ Interval allowed_interval(double mean, double sigma, double least, bool from_the
   return {with_above(0.975), with_above(0.025)};
 }
 
-/// Schur complement of the frames: what the data know of the parameters whatever the frames are.
+/// Schur complement of the normal matrix without the frames: information of the parameters alone, Eq. (M45).
 Eigen::MatrixXd without_frames(const Eigen::MatrixXd& normal, Eigen::Index frames) {
   const Eigen::Index parameters = normal.cols() - frames;
   if (frames == 0) return normal;
@@ -247,94 +248,112 @@ Eigen::MatrixXd without_frames(const Eigen::MatrixXd& normal, Eigen::Index frame
                  .solve(Eigen::MatrixXd(normal.topRightCorner(frames, parameters)));
 }
 
-}  // namespace
-
-Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
-        const Robot& robot, const EstimatorOptions& options) {
-  Fit out;
-  const Descent descent(unknowns, rows, robot, start.set);
-  Point point = descent.at(start);
+/// Result of the iteration: the estimate, the weights, and the quadratic model around it.
+struct Minimum {
+  Point point;
   RobustWeights robust;
-  robust.weight.assign(rows.size(), 1.0);
-  Quadratic quadratic = descent.quadratic(point, robust.weight);
-  // From weights to weights until they settle; a step in which they changed proves nothing.
-  const auto weigh_again = [&]() {
+  Quadratic quadratic;
+};
+
+/// Minimises the objective by modified Levenberg-Marquardt with re-weighting, Eq. (M35) to (M39).
+Minimum minimise(const Objective& objective, const Estimate& start, const EstimatorOptions& options,
+                 Fit& out) {
+  Minimum m;
+  m.point = objective.at(start);
+  m.robust.weight.assign(objective.rows(), 1.0);
+  m.quadratic = objective.quadratic(m.point, m.robust.weight);
+  // Re-weights until the weights are stationary; a step between two sets of weights is no test of convergence.
+  const auto weights_changed = [&]() {
     if (!options.robust) return false;
-    RobustWeights fresh = weigh(point.square, rows, unknowns.count());
+    RobustWeights fresh = objective.weights(m.point);
     double change = 0;
-    for (std::size_t k = 0; k < rows.size(); ++k)
-      change = std::max(change, std::abs(fresh.weight[k] - robust.weight[k]));
-    robust = std::move(fresh);
-    if (change > 0) quadratic = descent.quadratic(point, robust.weight);
+    for (std::size_t k = 0; k < fresh.weight.size(); ++k)
+      change = std::max(change, std::abs(fresh.weight[k] - m.robust.weight[k]));
+    m.robust = std::move(fresh);
+    if (change > 0) m.quadratic = objective.quadratic(m.point, m.robust.weight);
     return change > 1e-6;
   };
 
-  // A start that is nearly right, as a drawing is, needs nearly no damping: the model is linear but for 1e-3.
-  double mu = 1e-7 * quadratic.normal.diagonal().mean();
+  // The nominal start is close and the model linear to 1e-3: nearly no damping is needed.
+  double mu = 1e-7 * m.quadratic.normal.diagonal().mean();
   for (int trial = 0; trial < options.largest_iterations; ++trial) {
-    // What the undamped step would gain is the proof of convergence: the gradient in the metric of the problem.
-    const Eigen::VectorXd newton = bounded_step(quadratic, 0);
-    out.newton_decrement = quadratic.gain(newton);
-    const double bulk = std::max(1.0, robust.scale * robust.scale);
-    // Near the minimum the residuals are noise, and say which rows are not.
-    if (out.newton_decrement < 10 * bulk && weigh_again()) continue;
+    // Convergence is judged by the decrement of the undamped step, Eq. (M38).
+    const Eigen::VectorXd newton = bounded_step(m.quadratic, 0);
+    out.newton_decrement = m.quadratic.gain(newton);
+    const double bulk = std::max(1.0, m.robust.scale * m.robust.scale);
+    // Near the minimum the residuals are noise and show which rows are outliers.
+    if (out.newton_decrement < 10 * bulk && weights_changed()) continue;
     if (out.newton_decrement < 1e-9 * bulk) break;
-    Point next = descent.moved(point, bounded_step(quadratic, mu));
-    const double cost = descent.cost(point, robust.weight);
-    const double next_cost = descent.cost(next, robust.weight);
+    Point next = objective.moved(m.point, bounded_step(m.quadratic, mu));
+    const double cost = objective.cost(m.point, m.robust.weight);
+    const double next_cost = objective.cost(next, m.robust.weight);
     if (next_cost < cost) {
-      // Eq. 37 with its cases the right way round: success lowers the damping, by the ratio of the norms besides.
+      // Eq. (M36): Chen 37 with its cases exchanged. Success lowers the damping, also by the ratio of the norms.
       mu = mu / options.upsilon * std::sqrt(next_cost / cost);
-      point = std::move(next);
+      m.point = std::move(next);
       ++out.iterations;
       if (options.progress) options.progress(out.iterations, next_cost);
-      quadratic = descent.quadratic(point, robust.weight);
+      m.quadratic = objective.quadratic(m.point, m.robust.weight);
       if (cost - next_cost < 1e-13 * cost) break;
     } else {
-      if (next_cost <= cost * (1 + 1e-13)) break;  // at the rounding of the cost itself; the decrement judges
-      mu = std::max(mu, 1e-12 * quadratic.normal.diagonal().mean()) * options.upsilon;
+      if (next_cost <= cost * (1 + 1e-13)) break;  // at the rounding of the cost; the decrement decides
+      mu = std::max(mu, 1e-12 * m.quadratic.normal.diagonal().mean()) * options.upsilon;
       if (mu > 1e30) break;
     }
   }
-  out.newton_decrement = quadratic.gain(bounded_step(quadratic, 0));
+  out.newton_decrement = m.quadratic.gain(bounded_step(m.quadratic, 0));
+  return m;
+}
 
-  out.estimate = point.estimate;
-  out.weight = robust.weight;
-  out.scale = robust.scale;
-  double measured = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (out.weight[k] < 1) continue;
-    out.chi2 += point.square[static_cast<Eigen::Index>(k)];
-    measured += dimensions(rows[k]);
-  }
-  out.degrees_of_freedom = measured - static_cast<double>(unknowns.count());
-  // Weights that still change between rounds leave a gradient of rounding size in chi-square units of the bulk.
-  out.converged = std::isfinite(out.newton_decrement) &&
-                  std::abs(out.newton_decrement) < 1e-8 * std::max(1.0, out.scale * out.scale);
-
+/// Covariance, Eq. (M40), intervals, Eq. (M41), and singular values of a fit.
+void add_uncertainty(const Objective& objective, const Quadratic& quadratic, const Unknowns& unknowns,
+                     bool spectrum, Fit& out) {
   const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
   const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
   const Eigen::MatrixXd normal = quadratic.normal.selfadjointView<Eigen::Lower>();
   const Ldlt factor(normal);
   out.covariance = factor.inverse();
   if (out.degrees_of_freedom >= 1 && out.chi2 > chi2_quantile(0.9995, out.degrees_of_freedom)) {
-    // The noise that was declared does not explain the residuals: they themselves say how uncertain the result is.
+    // The declared noise does not explain the residuals: their own variance scales the covariance.
     out.covariance *= out.chi2 / out.degrees_of_freedom;
   }
   const Eigen::VectorXd to_unbounded = factor.solve(quadratic.gradient);
   for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
     const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
     const double value = unknowns.parameters[p].get(out.estimate.set);
-    const double unbounded = value + to_unbounded[i] * descent.unit(i);
-    const double sigma = std::sqrt(std::max(0.0, out.covariance(i, i))) * descent.unit(i);
-    out.at_bound.push_back(descent.on_bound(out.estimate, p));
+    const double unbounded = value + to_unbounded[i] * objective.unit(i);
+    const double sigma = std::sqrt(std::max(0.0, out.covariance(i, i))) * objective.unit(i);
+    out.at_bound.push_back(objective.on_bound(out.estimate, p));
     out.interval.push_back(
         allowed_interval(unbounded, sigma, unknowns.prior_of(p).least, out.at_bound.back()));
   }
-  if (options.spectrum && columns > frames) {
+  if (spectrum && columns > frames) {
     out.singular_values =
         symmetric_eigen(without_frames(normal, frames)).values.cwiseMax(0).cwiseSqrt().reverse();
   }
+}
+
+}  // namespace
+
+Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
+        const Robot& robot, const EstimatorOptions& options) {
+  Fit out;
+  const Objective objective(unknowns, rows, robot, start.set);
+  const Minimum m = minimise(objective, start, options, out);
+  out.estimate = m.point.estimate;
+  out.weight = m.robust.weight;
+  out.scale = m.robust.scale;
+  double measured = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (out.weight[k] < 1) continue;
+    out.chi2 += m.point.square[static_cast<Eigen::Index>(k)];
+    measured += measured_numbers(rows[k]);
+  }
+  out.degrees_of_freedom = measured - static_cast<double>(unknowns.count());
+  // Re-weighting leaves a gradient of the size of rounding, in units of the bulk's chi-square.
+  out.converged = std::isfinite(out.newton_decrement) &&
+                  std::abs(out.newton_decrement) < 1e-8 * std::max(1.0, out.scale * out.scale);
+  add_uncertainty(objective, m.quadratic, unknowns, options.spectrum, out);
   return out;
 }
 

@@ -18,12 +18,13 @@ struct EstimatorOptions {
   double upsilon = 10;  ///< step length coefficient of the damping; 4 … 100 all work (the paper)
   int largest_iterations = 200;
   bool robust = true;  ///< false: every row has weight 1
-  bool spectrum =
-      true;  ///< false: Fit::singular_values are not wanted (the most expensive part where unknowns are many)
+  /// False: without Fit::singular_values (the most expensive part where unknowns are many).
+  bool spectrum = true;
   /// Called after each accepted step with the iteration and the cost; may be empty.
   std::function<void(int, double)> progress;
 };
 
+/// Result of fit().
 struct Fit {
   Estimate estimate;
   bool converged = false;  ///< the exact gradient vanishes, see newton_decrement
@@ -39,22 +40,22 @@ struct Fit {
   /// Covariance of the unknowns in units_of(), prior included, bounds left out; from the declared noise, or from the
   /// residuals where chi-square says that the noise alone does not explain them.
   Eigen::MatrixXd covariance;
-  std::vector<bool> at_bound;  ///< per parameter: its estimate is the least that its prior allows
-  /// 95 % interval per parameter. Of one that is bounded: the 95 % of the normal distribution around the unbounded
-  /// estimate that physics allows; one-sided, from the bound up, where the estimate is at it.
+  std::vector<bool> at_bound;  ///< per parameter: the estimate is at its lower bound
+  /// 95 % interval per parameter, Eq. (M41): of the normal distribution around the unbounded estimate, truncated at the
+  /// bound; one-sided, from the bound up, where the estimate is at it.
   std::vector<Interval> interval;
-  Eigen::VectorXd
-      singular_values;  ///< of the whitened, scaled derivative of the parameters (frames projected out)
+  /// Singular values of the whitened, scaled derivative of the parameters (frames projected out).
+  Eigen::VectorXd singular_values;
 
   double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
 };
 
-/// Fits `unknowns`, starting at `start`. The derivative (with the priors as further rows) must have full column rank:
-/// eliminate() first.
+/// Fits `unknowns` by robust weighted least squares, starting at `start`. The derivative (with the priors as
+/// further rows) must have full column rank: eliminate() first.
 ///
-/// All residuals are whitened. Robust loss: a row has weight 1 up to the 99.9 % quantile of its chi-square at the robust
-/// scale, beyond it weight (quantile / square). Every step keeps the bounds (active set); convergence is tested on the
-/// bounded problem.
+/// Minimises (M34) by modified Levenberg-Marquardt, (M35) to (M39). Robust loss: a row has weight 1 up to the 99.9 %
+/// quantile of its chi-square at the robust scale, beyond it weight (quantile / square). Every step keeps the bounds
+/// (active set); convergence is tested on the bounded problem.
 Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Observation>& rows,
         const Robot& robot, const EstimatorOptions& options = {});
 

@@ -10,13 +10,14 @@ namespace flexcomp::host {
 
 namespace {
 
-void keep_what_was_identified(Calibration& calibration, const TermSet& set, const Unknowns& fitted,
-                              const Eigen::VectorXd& sigma) {
+/// Copies fitted and given terms with their standard deviations; others (coefficient zero) are left out.
+void copy_identified_terms(Calibration& calibration, const TermSet& set, const Unknowns& fitted,
+                           const Eigen::VectorXd& sigma) {
   std::vector<double> of_term(set.terms.size(), std::nan(""));
   std::vector<double> of_value(set.values.size(), std::nan(""));
   std::vector<bool> kept(set.terms.size(), false);
   for (std::size_t t = 0; t < set.terms.size(); ++t) {
-    kept[t] = set.terms[t].coefficient != 0;  // fixed: given, hence without uncertainty
+    kept[t] = set.terms[t].coefficient != 0;  // fixed by the user: no uncertainty
   }
   for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
     const double s = sigma[static_cast<Eigen::Index>(fitted.frames.size() + p)];
@@ -42,7 +43,7 @@ Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Rob
   Calibration out;
   const Eigen::VectorXd units = units_of(fitted, fit.estimate.set);
   const Eigen::VectorXd sigma = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt().cwiseProduct(units);
-  keep_what_was_identified(out, fit.estimate.set, fitted, sigma);
+  copy_identified_terms(out, fit.estimate.set, fitted, sigma);
   out.covariance = CovarianceFactor{names_of(fitted), units.asDiagonal() * Llt(fit.covariance).lower()};
   if (!fitted.frames.empty())
     out.frames = MeasurementFrames{Frame::of(fit.estimate.f), Frame::of(fit.estimate.e)};

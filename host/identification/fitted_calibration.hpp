@@ -11,8 +11,8 @@
 
 namespace flexcomp::host {
 
-/// Terms, their uncertainty, frames (where `fitted` moves them), covariance, bounds; stamped. Terms that were neither
-/// fitted nor given (coefficient zero) are left out.
+/// Builds the calibration of a fit: terms with standard deviations, frames where fitted, covariance factor, bounds, and
+/// the robot's name and hash. Terms that were neither fitted nor given (coefficient zero) are left out.
 Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot);
 
 }  // namespace flexcomp::host

@@ -8,6 +8,7 @@
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
 #include "linalg/nearest_rotation.hpp"
+#include "identification/statistics.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
 
@@ -15,7 +16,8 @@ namespace flexcomp::host {
 
 namespace {
 
-/// R_k = F N_k E for all rows: alternating nearest rotations from 24 starts (the turns of a cube), best kept.
+/// Solves R_k = F N_k E for the rotations of F and E by alternating nearest rotations from 24 starts (rotations
+/// of a cube).
 void align_rotations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model,
                      Pose<double>& f, Pose<double>& e) {
   double best = -1;
@@ -50,7 +52,7 @@ void align_rotations(const std::vector<Observation>& rows, const std::vector<Pos
   }
 }
 
-/// p_k = F_p + F_R (P_k + N_k E_p) is linear in F_p and E_p once F_R is known.
+/// Solves p_k = F_p + F_R (P_k + N_k E_p) for F_p and E_p by linear least squares, F_R given.
 void solve_translations(const std::vector<Observation>& rows, const std::vector<Pose<double>>& model,
                         Pose<double>& f, Pose<double>& e) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
@@ -61,7 +63,7 @@ void solve_translations(const std::vector<Observation>& rows, const std::vector<
     normal += a.transpose() * a;
     right += a.transpose() * (rows[k].p_m - f.rotation * model[k].position);
   }
-  // Where all poses have one orientation only the sum of the two is known: then E stays 0.
+  // With one orientation only the sum of the two is identifiable: the minimum-norm solution.
   const Vector6<double> x = normal.completeOrthogonalDecomposition().solve(right);
   f.position = x.head<3>();
   e.position = x.tail<3>();
@@ -86,7 +88,7 @@ Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, co
     align_rotations(rows, poses, start.f, start.e);
     solve_translations(rows, poses, start.f, start.e);
   } else {
-    // Alternate between the rigid fit of the points and the tool point that explains what is left.
+    // Alternates between the rigid fit of the points and the tool point that fits the residual.
     for (int round = 0; round < 200; ++round) {
       Points points;
       for (const Pose<double>& p : poses) points.push_back(p.position + p.rotation * start.e.position);
@@ -99,7 +101,7 @@ Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, co
   Unknowns unknowns;
   const std::vector<std::size_t> all = free_frames(rows);
   unknowns.frames = all;
-  // One orientation, or too few rows, leave part of the frames unknown: that part keeps its start.
+  // Frame parameters that are not identifiable (one orientation, too few rows) keep their start.
   const Linearised lin = linearised(start, *model, rows, unknowns);
   const Elimination found = eliminate(lin.derivative, elimination_order(unknowns, set));
   unknowns.frames.clear();
@@ -115,12 +117,6 @@ bool nominal_frames_are_off(const std::vector<RowResidual>& nominal, const std::
     position.push_back(nominal[k].position_m.norm());
     if (rows[k].has_orientation) orientation.push_back(nominal[k].orientation_rad.norm());
   }
-  const auto median = [](std::vector<double>& v) {
-    if (v.empty()) return 0.0;
-    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-    std::nth_element(v.begin(), middle, v.end());
-    return *middle;
-  };
   return median(position) > 0.020 || median(orientation) > radians(2);
 }
 

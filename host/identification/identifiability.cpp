@@ -22,16 +22,16 @@ Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::si
   Eigen::MatrixXd basis(matrix.rows(), static_cast<Eigen::Index>(order.size()));
   Eigen::Index rank = 0;
   std::vector<std::size_t> kept_in_order;
-  std::vector<std::size_t> lost;
+  std::vector<std::size_t> dependent;
   double largest = 0;
   for (const std::size_t c : order)
     largest = std::max(largest, matrix.col(static_cast<Eigen::Index>(c)).norm());
   for (const std::size_t c : order) {
     Eigen::VectorXd column = matrix.col(static_cast<Eigen::Index>(c));
     const double norm = column.norm();
-    // Units are chosen such that columns are of like size: one 1e-12 smaller is rounding.
+    // Fixed units give columns of similar size: a column 1e-12 times as large is rounding.
     if (!(norm > 1e-12 * largest)) {
-      out.lost.push_back({c, {}});
+      out.dependent.push_back({c, {}});
       continue;
     }
     column /= norm;
@@ -42,31 +42,31 @@ Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::si
       basis.col(rank++) = column.normalized();
       kept_in_order.push_back(c);
     } else {
-      lost.push_back(c);
+      dependent.push_back(c);
     }
   }
-  if (!lost.empty()) {
+  if (!dependent.empty()) {
     Eigen::MatrixXd kept(matrix.rows(), rank);
     for (Eigen::Index k = 0; k < rank; ++k) {
       kept.col(k) =
           matrix.col(static_cast<Eigen::Index>(kept_in_order[static_cast<std::size_t>(k)])).normalized();
     }
     const PivotedQr qr(kept);
-    for (const std::size_t c : lost) {
+    for (const std::size_t c : dependent) {
       const Eigen::VectorXd share = qr.solve(matrix.col(static_cast<Eigen::Index>(c)).normalized());
-      LostColumn entry{c, {}};
+      DependentColumn entry{c, {}};
       const double most = share.cwiseAbs().maxCoeff();
       for (Eigen::Index k = 0; k < rank; ++k) {
         if (std::abs(share[k]) > 1e-3 * most)
           entry.with.push_back(kept_in_order[static_cast<std::size_t>(k)]);
       }
-      out.lost.push_back(entry);
+      out.dependent.push_back(entry);
     }
   }
   out.kept = kept_in_order;
   std::sort(out.kept.begin(), out.kept.end());
-  std::sort(out.lost.begin(), out.lost.end(),
-            [](const LostColumn& a, const LostColumn& b) { return a.column < b.column; });
+  std::sort(out.dependent.begin(), out.dependent.end(),
+            [](const DependentColumn& a, const DependentColumn& b) { return a.column < b.column; });
   return out;
 }
 

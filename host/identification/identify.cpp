@@ -18,8 +18,8 @@ namespace flexcomp::host {
 
 namespace {
 
-/// Arms miss by 0.5 to 4 mm before calibration; per metre of reach about half a millimetre once base and tool are fitted
-/// (the measured UR5 and UR10: 0.5 and 0.7 mm). A hundred times that is no arm's error.
+/// Position errors before calibration are 0.5 to 4 mm; per metre of reach about half a millimetre with fitted base and
+/// tool (the measured UR5 and UR10: 0.5 and 0.7 mm). A hundred times that is an error of units or joints.
 constexpr double usual_error_per_reach = 5e-4;
 constexpr double suspicious_factor = 100;
 
@@ -39,7 +39,7 @@ double spread(const std::vector<Eigen::Vector3d>& points) {
   return std::sqrt(sum);
 }
 
-/// Takes fixed parameters out of those to be fitted and sets their values.
+/// Sets fixed parameters to their values and removes them from those to be fitted.
 void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& set,
          std::vector<Parameter>& parameters) {
   for (const FixedParameter& f : fixed) {
@@ -57,6 +57,44 @@ void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& 
   }
 }
 
+/// B is the small transform from the constructed base frame to the robot's own; a larger one is a measurement frame F.
+/// \throws InputError  a base above 20 mm or 2 degrees
+void require_small_base(const Calibration& calibration, const std::string& source) {
+  double shift = 0;
+  double rotation = 0;
+  for (const Term<double>& t : calibration.terms.terms) {
+    if (t.place.body != body::base || t.basis != Basis::one) continue;
+    double& largest = t.place.slot <= slot::z ? shift : rotation;
+    largest = std::max(largest, std::abs(t.coefficient));
+  }
+  if (shift > 0.020 || rotation > radians(2)) {
+    throw InputError(
+        source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
+        fmt::format("{:.1f} mm, {:.2f} degrees; --frames fit lets the measurement frame lie anywhere",
+                    shift * 1e3, degrees(rotation)));
+  }
+}
+
+/// Reasons why the result is not reliable: parameters not identifiable, no convergence, no redundancy.
+std::vector<std::string> doubts_about(const Identification& result, std::size_t rows) {
+  std::vector<std::string> out;
+  const std::vector<std::string>& missing = result.identifiability.missing;
+  if (!missing.empty()) {
+    out.push_back(
+        fmt::format("{} parameters are not identifiable from these {} rows, but are from random poses of the "
+                    "same kind: {}",
+                    missing.size(), rows, fmt::join(missing, ", ")));
+  }
+  if (!result.fit.converged) {
+    out.push_back(fmt::format("the fit did not converge (a further step would reduce chi-square by {:.2g})",
+                              result.fit.newton_decrement));
+  }
+  if (missing.empty() && result.fit.degrees_of_freedom < 1) {
+    out.emplace_back("there are as many unknowns as measured numbers: no redundancy to check the result");
+  }
+  return out;
+}
+
 }  // namespace
 
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted) {
@@ -64,7 +102,7 @@ Before errors_before(const Robot& robot, const std::vector<Observation>& rows, E
   Estimate nominal;
   const auto model = prepare(TermSet(), robot, "nominal robot");
   before.nominal_frames = statistics(residuals(nominal, *model, rows), rows);
-  // Below four rows a frame of six numbers and a tool point of three fit nearly anything.
+  // With fewer than four rows the 6 + 3 frame parameters fit any data.
   if (rows.size() >= 4) {
     const Estimate frames = fit_frames(TermSet(), rows, robot);
     before.fitted_frames = statistics(residuals(frames, *model, rows), rows);
@@ -73,8 +111,8 @@ Before errors_before(const Robot& robot, const std::vector<Observation>& rows, E
   return before;
 }
 
-void refuse_the_implausible(const Robot& robot, const std::vector<Observation>& rows,
-                            const std::string& source, const Before& before) {
+void require_plausible_residuals(const Robot& robot, const std::vector<Observation>& rows,
+                                 const std::string& source, const Before& before) {
   const double limit = suspicious_factor * usual_error_per_reach * reach(robot);
   const double found = before.fitted_frames
                            ? std::min(before.fitted_frames->rms_m, before.nominal_frames.rms_m)
@@ -101,7 +139,7 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   Identification out;
   Estimate start;
   out.before = errors_before(robot, rows, &start);
-  if (!options.force) refuse_the_implausible(robot, rows, source, out.before);
+  if (!options.force) require_plausible_residuals(robot, rows, source, out.before);
 
   Estimate nominal;
   const auto nominal_model = prepare(TermSet(), robot, source);
@@ -119,9 +157,9 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   all.parameters = paper.parameters;
   fix(options.fixed, robot, start.set, all.parameters);
   all.prior = prior_knowledge(start.set, all.parameters, options.physical, options.tolerances);
-  // At the nominal arm, where nothing is parallel by accident only.
-  out.known = analyse_identifiability(robot, rows, start, all, options.seed);
-  const Unknowns& fitted = out.known.fitted;
+  // At the nominal arm: estimated deviations would make parallel axes look separable.
+  out.identifiability = analyse_identifiability(robot, rows, start, all, options.seed);
+  const Unknowns& fitted = out.identifiability.fitted;
   out.frame_parameters = fitted.frames.size();
   out.identifiable = fitted.parameters.size();
 
@@ -140,55 +178,24 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   const auto model = prepare(out.fit.estimate.set, robot, source);
   out.residuals = residuals(out.fit.estimate, *model, rows);
   out.after = statistics(out.residuals, rows);
-  std::vector<Observation> in_full;
+  std::vector<Observation> inliers;
   for (std::size_t k = 0; k < out.fit.weight.size(); ++k) {
     if (out.fit.weight[k] < 1) {
       out.outliers.push_back(k);
     } else {
-      in_full.push_back(rows[k]);
+      inliers.push_back(rows[k]);
     }
   }
-  if (fitted.count() > 0) out.pure_error = pure_error(in_full, out.fit.chi2, out.fit.degrees_of_freedom);
+  if (fitted.count() > 0) out.pure_error = pure_error(inliers, out.fit.chi2, out.fit.degrees_of_freedom);
 
   out.calibration = fitted_calibration(out.fit, fitted, robot);
-  if (!fit_frames_too) {
-    // B is the small step from the constructed base frame to the robot's own; anything larger is another frame (F).
-    double shift = 0;
-    double turn = 0;
-    for (const Term<double>& t : out.calibration.terms.terms) {
-      if (t.place.body != body::base || t.basis != Basis::one) continue;
-      double& largest = t.place.slot <= slot::z ? shift : turn;
-      largest = std::max(largest, std::abs(t.coefficient));
-    }
-    if (shift > 0.020 || turn > radians(2)) {
-      throw InputError(
-          source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
-          fmt::format("{:.1f} mm, {:.2f} degrees; --frames fit lets the measurement frame lie anywhere",
-                      shift * 1e3, degrees(turn)));
-    }
-  }
-  out.calibration.confounded = out.known.confounded;
+  if (!fit_frames_too) require_small_base(out.calibration, source);
+  out.calibration.confounded = out.identifiability.confounded;
   out.calibration.residuals = {{"before_mean_mm", out.before.nominal_frames.mean_m * 1e3},
                                {"after_mean_mm", out.after.mean_m * 1e3},
                                {"after_rms_mm", out.after.rms_m * 1e3},
                                {"after_max_mm", out.after.max_m * 1e3}};
-
-  if (!out.known.missing.empty()) {
-    std::string list;
-    for (const std::string& m : out.known.missing) list += (list.empty() ? "" : ", ") + m;
-    out.doubts.push_back(
-        fmt::format("these {} rows cannot know {} parameters that random poses of the same kind would: {}",
-                    rows.size(), out.known.missing.size(), list));
-  }
-  if (!out.fit.converged) {
-    out.doubts.push_back(
-        fmt::format("the fit did not converge (a further step would still gain {:.2g} in chi-square)",
-                    out.fit.newton_decrement));
-  }
-  if (out.known.missing.empty() && out.fit.degrees_of_freedom < 1) {
-    out.doubts.push_back(
-        "there are as many unknowns as measured numbers: nothing is left to check the result against");
-  }
+  out.doubts = doubts_about(out, rows.size());
   return out;
 }
 

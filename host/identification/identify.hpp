@@ -20,7 +20,7 @@
 
 namespace flexcomp::host {
 
-/// A parameter that is known from elsewhere and not fitted.
+/// Parameter that is not fitted, with its given value.
 struct FixedParameter {
   std::string name;
   double value_si = 0;
@@ -31,15 +31,16 @@ struct IdentifyOptions {
   FrameChoice frames = FrameChoice::by_distance;
   std::vector<FixedParameter> fixed;
   std::vector<Tolerance> tolerances;  ///< of parameters by name; later ones win
-  bool physical = true;               ///< compliances are kept at or above zero
-  bool force = false;                 ///< go on where the data look like another unit or another arm
+  bool physical = true;               ///< bounds compliances at zero
+  bool force = false;                 ///< accept residuals that suggest another unit or arm
   std::uint64_t seed = 1;             ///< of the 1,000 random reference poses of the identifiability analysis
   EstimatorOptions estimator;
 };
 
+/// Errors of the nominal arm.
 struct Before {
   ErrorStatistics nominal_frames;
-  std::optional<ErrorStatistics> fitted_frames;  ///< nothing where the rows are too few for a frame
+  std::optional<ErrorStatistics> fitted_frames;  ///< from four rows on
 };
 
 struct Identification {
@@ -47,10 +48,10 @@ struct Identification {
   std::size_t parameters = 0;    ///< of the model, without F and E
   std::size_t identifiable = 0;  ///< of these, in these data
   std::size_t frame_parameters = 0;
-  Identifiability known;  ///< what these data identify, what they do not, and poses that would
-  Fit fit;                ///< of known.fitted
-  double condition = 0;   ///< of the whitened, scaled columns of the parameters
-  double o1 = 0;          ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
+  Identifiability identifiability;  ///< identifiable, confounded and missing parameters; suggested poses
+  Fit fit;                          ///< of identifiability.fitted
+  double condition = 0;             ///< of the whitened, scaled columns of the parameters
+  double o1 = 0;                    ///< (product of their singular values)^(1/L) / sqrt(n), Borm and Menq
   Before before;
   ErrorStatistics after;
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where the model has them, per row
@@ -58,22 +59,25 @@ struct Identification {
   std::vector<std::size_t> outliers;   ///< down-weighted rows, by index
   std::optional<PureError>
       pure_error;  ///< of repeated rows, outliers left out; nothing where none are repeated
-  /// Why the result must not be relied on; empty where it may.
+  /// Reasons why the result is not reliable; empty where it is.
   std::vector<std::string> doubts;
 };
 
+/// Identifies the paper's model from rows: identifiability (M33), fit (M34), uncertainty (M40).
 /// \param source  names the data in messages
-/// \throws InputError  a fixed parameter or a tolerance of one that the model does not have; residuals to the nominal arm over 100 times what an arm of this size usually has (metres for
-///                     millimetres, another arm), unless options.force; a fitted base above 20 mm or 2 degrees
+/// \throws InputError  a fixed parameter or a tolerance of one that the model does not have; residuals to the
+///                     nominal arm over 100 times the usual ones (metres for millimetres, another arm), unless
+///                     options.force; a fitted base above 20 mm or 2 degrees
 Identification identify(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,
                         const IdentifyOptions& options);
 
-/// Errors of the nominal arm, in nominal and in fitted frames. `model` (optional) receives the fitted frames.
+/// Errors of the nominal arm, in nominal and in fitted frames. \param fitted  receives the fitted frames, may be null
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
 
-/// \throws InputError  the rows are further from the nominal arm than any arm of this size: another unit, another arm
-void refuse_the_implausible(const Robot& robot, const std::vector<Observation>& rows,
-                            const std::string& source, const Before& before);
+/// Refuses residuals to the nominal arm above 100 times the usual 0.5 mm per metre of reach: another unit or arm.
+/// \throws InputError
+void require_plausible_residuals(const Robot& robot, const std::vector<Observation>& rows,
+                                 const std::string& source, const Before& before);
 
 }  // namespace flexcomp::host
 

@@ -41,15 +41,15 @@ Eigen::MatrixXd select_both(const Eigen::MatrixXd& m, const std::vector<std::siz
   return out;
 }
 
-/// The columns of some rows beside those of as many random ones, as far as judging them needs it.
-struct Judge {
-  Eigen::MatrixXd data;    ///< triangular factor of the rows, or the rows themselves
-  Eigen::MatrixXd usual;   ///< information of random rows, per as many as there are
-  std::size_t frames = 0;  ///< the first so many columns are frames: never dropped
+/// Test of weak identifiability: the rows' columns against the information of as many random rows.
+struct WeaknessTest {
+  Eigen::MatrixXd data;       ///< identification matrix of the rows, or its triangular factor
+  Eigen::MatrixXd reference;  ///< information matrix of as many random rows
+  std::size_t frames = 0;     ///< leading columns of frame parameters: never dropped
 
-  /// Known in principle is not known: a parameter whose standard deviation is over 30 units (3 mm, 1.5 degrees) and
-  /// over 30 times what as many random poses would give is left out, the last in the order first, until none is.
-  /// Otherwise near-confounded ones run off together (a5 = 43 mm +- 40 mm) and the others with them.
+  /// Drops, last in `order` first, parameters whose standard deviation exceeds 30 units (3 mm, 1.5 degrees) and
+  /// 30 times that from as many random poses. Nearly confounded ones would diverge together (a5 = 43 mm +- 40
+  /// mm).
   std::vector<std::size_t> drop_weakly_identifiable(const std::vector<std::size_t>& order,
                                                     std::vector<std::size_t>& kept) const {
     constexpr double too_many = 30;
@@ -57,7 +57,7 @@ struct Judge {
     std::vector<std::size_t> dropped;
     while (!kept.empty()) {
       const Eigen::VectorXd here = sigmas(select_both(here_all, kept));
-      const Eigen::VectorXd there = sigmas(select_both(usual, kept));
+      const Eigen::VectorXd there = sigmas(select_both(reference, kept));
       std::size_t worst = kept.size();
       std::size_t latest = 0;
       for (std::size_t k = 0; k < kept.size(); ++k) {
@@ -77,7 +77,8 @@ struct Judge {
     return dropped;
   }
 
-  bool knows_all() const {
+  /// True where all columns are identifiable.
+  bool identifies_all() const {
     std::vector<std::size_t> order(static_cast<std::size_t>(data.cols()));
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::vector<std::size_t> kept = eliminate(data, order).kept;
@@ -85,19 +86,19 @@ struct Judge {
   }
 };
 
-/// Greedy choice among the random poses of the reference until all columns are known: each adds the most information
-/// about what is still unknown (D-optimal, by rank-six updates).
-std::vector<SuggestedPose> poses_that_cure(Judge judge, const Eigen::MatrixXd& reference,
-                                           const std::vector<Observation>& reference_rows) {
+/// Chooses poses from the reference greedily by D-optimality, with rank-six updates, until all columns are
+/// identifiable.
+std::vector<SuggestedPose> suggest_poses(WeaknessTest test, const Eigen::MatrixXd& reference,
+                                         const std::vector<Observation>& reference_rows) {
   constexpr std::size_t most = 40;
   constexpr Eigen::Index candidates = 300;
-  const Eigen::Index columns = judge.data.cols();
-  // A weak prior of 100 units stands in for what the data do not know.
+  const Eigen::Index columns = test.data.cols();
+  // A weak prior of 100 units makes the singular information matrix invertible.
   Eigen::MatrixXd covariance =
-      inverse(information(judge.data) + 1e-4 * Eigen::MatrixXd::Identity(columns, columns));
+      inverse(information(test.data) + 1e-4 * Eigen::MatrixXd::Identity(columns, columns));
   std::vector<SuggestedPose> chosen;
   std::set<Eigen::Index> taken;
-  while (chosen.size() < most && !judge.knows_all()) {
+  while (chosen.size() < most && !test.identifies_all()) {
     double best = -1;
     Eigen::Index which = 0;
     for (Eigen::Index c = 0; c < candidates; ++c) {
@@ -116,8 +117,8 @@ std::vector<SuggestedPose> poses_that_cure(Judge judge, const Eigen::MatrixXd& r
     const Eigen::MatrixXd ch = covariance * h.transpose();
     const Eigen::MatrixXd gain = Eigen::MatrixXd::Identity(6, 6) + h * ch;
     covariance -= ch * Ldlt(gain).solve(Eigen::MatrixXd(ch.transpose()));
-    judge.data.conservativeResize(judge.data.rows() + 6, Eigen::NoChange);
-    judge.data.bottomRows<6>() = h;
+    test.data.conservativeResize(test.data.rows() + 6, Eigen::NoChange);
+    test.data.bottomRows<6>() = h;
     const Observation& row = reference_rows[static_cast<std::size_t>(which)];
     chosen.push_back({row.q_rad, row.context.payload_kg});
   }
@@ -153,11 +154,11 @@ std::vector<Observation> reference_like(const Robot& robot, const std::vector<Ob
   return reference;
 }
 
-/// What every second row without its payload would gain. Expected from random poses, carried over to these rows.
-std::vector<PayloadGain> gains_of_a_second_payload(std::vector<Observation> reference, const Estimate& start,
-                                                   const HostModel& model, const Unknowns& fitted,
-                                                   const Eigen::VectorXd& sigma) {
-  constexpr double worth_saying = 1.5;
+/// Gains in standard deviation if every second row had no payload; ratios from random poses, applied to these rows.
+std::vector<PayloadGain> second_payload_gains(std::vector<Observation> reference, const Estimate& start,
+                                              const HostModel& model, const Unknowns& fitted,
+                                              const Eigen::VectorXd& sigma) {
+  constexpr double least_gain = 1.5;
   std::vector<PayloadGain> gains;
   const Eigen::VectorXd one = sigmas(information(linearised(start, model, reference, fitted).derivative));
   for (std::size_t k = 0; k < reference.size(); k += 2) reference[k].context.payload_kg = 0;
@@ -165,7 +166,7 @@ std::vector<PayloadGain> gains_of_a_second_payload(std::vector<Observation> refe
   const Eigen::VectorXd units = units_of(fitted, start.set);
   for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
     const Eigen::Index i = static_cast<Eigen::Index>(fitted.frames.size() + p);
-    if (!(one[i] > worth_saying * both[i])) continue;
+    if (!(one[i] > least_gain * both[i])) continue;
     gains.push_back({fitted.parameters[p].name, sigma[i] * units[i], sigma[i] * units[i] * both[i] / one[i]});
   }
   return gains;
@@ -191,49 +192,50 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
   const Eigen::MatrixXd reference_matrix = linearised(start, *model, reference, all).derivative;
   const Eigen::MatrixXd data_matrix = triangular_factor(linearised(start, *model, rows, all).derivative);
   const Elimination possible = eliminate(reference_matrix, order, structural_tolerance);
-  for (const LostColumn& lost : possible.lost) {
-    Confounded entry{names[lost.column], {}};
-    for (const std::size_t c : lost.with) entry.with.push_back(names[c]);
+  for (const DependentColumn& column : possible.dependent) {
+    Confounded entry{names[column.column], {}};
+    for (const std::size_t c : column.with) entry.with.push_back(names[c]);
     out.confounded.push_back(entry);
   }
   std::vector<std::size_t> possible_order;
   for (const std::size_t c : order) {
     if (std::binary_search(possible.kept.begin(), possible.kept.end(), c)) possible_order.push_back(c);
   }
-  Judge judge;
-  judge.data = data_matrix;
-  judge.usual = information(reference_matrix) * (static_cast<double>(rows.size()) / reference_count);
-  judge.frames = all.frames.size();
-  Elimination known = eliminate(data_matrix, possible_order);
+  WeaknessTest test;
+  test.data = data_matrix;
+  test.reference = information(reference_matrix) * (static_cast<double>(rows.size()) / reference_count);
+  test.frames = all.frames.size();
+  Elimination identified = eliminate(data_matrix, possible_order);
   std::set<std::size_t> missing;
-  for (const LostColumn& lost : known.lost) missing.insert(lost.column);
-  for (const std::size_t c : judge.drop_weakly_identifiable(possible_order, known.kept)) missing.insert(c);
+  for (const DependentColumn& column : identified.dependent) missing.insert(column.column);
+  for (const std::size_t c : test.drop_weakly_identifiable(possible_order, identified.kept))
+    missing.insert(c);
   for (const std::size_t c : missing) out.missing.push_back(names[c]);
 
   std::vector<std::size_t> fitted_columns;
   for (const std::size_t c : possible.kept) {
-    const bool is_frame = c < judge.frames;
-    const PriorKnowledge prior = is_frame ? PriorKnowledge() : all.prior_of(c - judge.frames);
+    const bool is_frame = c < test.frames;
+    const PriorKnowledge prior = is_frame ? PriorKnowledge() : all.prior_of(c - test.frames);
     if (missing.count(c) != 0 && !std::isfinite(prior.tolerance)) continue;
     fitted_columns.push_back(c);
     if (is_frame) {
       out.fitted.frames.push_back(all.frames[c]);
     } else {
-      out.fitted.parameters.push_back(all.parameters[c - judge.frames]);
+      out.fitted.parameters.push_back(all.parameters[c - test.frames]);
       out.fitted.prior.push_back(prior);
     }
   }
   if (!missing.empty()) {
-    // In the order of preference, so that the same columns are judged here as above; frames stand first in it.
-    Judge selected;
+    // In the elimination order, so that the same columns are tested as above; frames come first in it.
+    WeaknessTest selected;
     selected.data = select(data_matrix, possible_order);
-    selected.usual = select_both(judge.usual, possible_order);
-    selected.frames = static_cast<std::size_t>(std::count_if(
-        possible_order.begin(), possible_order.end(), [&](std::size_t c) { return c < judge.frames; }));
-    out.cure = poses_that_cure(selected, select(reference_matrix, possible_order), reference);
+    selected.reference = select_both(test.reference, possible_order);
+    selected.frames = static_cast<std::size_t>(std::count_if(possible_order.begin(), possible_order.end(),
+                                                             [&](std::size_t c) { return c < test.frames; }));
+    out.suggested_poses = suggest_poses(selected, select(reference_matrix, possible_order), reference);
   } else if (one_payload(rows) && rows.front().context.payload_kg > 0 && has_stiffness(all, start.set)) {
-    out.payload_gains = gains_of_a_second_payload(reference, start, *model, out.fitted,
-                                                  sigmas(information(select(data_matrix, fitted_columns))));
+    out.payload_gains = second_payload_gains(reference, start, *model, out.fitted,
+                                             sigmas(information(select(data_matrix, fitted_columns))));
   }
   return out;
 }

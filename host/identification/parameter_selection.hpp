@@ -35,13 +35,14 @@ struct Identifiability {
   std::vector<std::string>
       missing;  ///< identifiable from 1,000 random poses of this kind, but not from these rows
   /// Poses that would identify the missing parameters, best first; empty where none is missing.
-  std::vector<SuggestedPose> cure;
+  std::vector<SuggestedPose> suggested_poses;
   std::vector<PayloadGain> payload_gains;  ///< where all rows have one payload; largest sigma first
 };
 
-/// Analyses the identifiability of the unknowns `all` at the estimate `start`. Rows "of this kind" measure the same (poses, positions) in the same contexts;
-/// where every row is without payload though the robot file has one, half of them have it.
-/// Missing parameters that have a tolerance stay in `fitted`: the tolerance is their prior.
+/// Analyses the identifiability of the unknowns `all` at the estimate `start`, Eq. (M33). Rows "of this kind"
+/// measure the same (poses, positions) in the same contexts; where every row is without payload though the
+/// robot file has one, half of them have it. Missing parameters that have a tolerance stay in `fitted`: the
+/// tolerance is their prior.
 Identifiability analyse_identifiability(const Robot& robot, const std::vector<Observation>& rows,
                                         const Estimate& start, const Unknowns& all, std::uint64_t seed);
 

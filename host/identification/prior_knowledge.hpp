@@ -12,14 +12,15 @@
 
 namespace flexcomp::host {
 
-/// Of one parameter, SI.
+/// Prior of one parameter, SI: normal around `expected`, bounded below, Eq. (M34), (M37).
 struct PriorKnowledge {
-  double least = -std::numeric_limits<double>::infinity();  ///< physics forbids less: 0 for a compliance
+  double least = -std::numeric_limits<double>::infinity();  ///< physical lower bound: 0 for a compliance
   double expected = 0;
   double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
 };
 
-/// One per parameter. \param physical  a joint deflects in the direction of the torque: compliances are 0 or more
+/// Priors of the parameters, one each. \param physical a joint deflects in the direction of the torque:
+/// compliances are 0 or more
 /// \throws InputError  a tolerance that matches no parameter; of two that match one the later applies
 std::vector<PriorKnowledge> prior_knowledge(const TermSet& set, const std::vector<Parameter>& parameters,
                                             bool physical, const std::vector<Tolerance>& tolerances);

@@ -85,7 +85,7 @@ std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& mo
 
 namespace {
 
-/// d value of a table's term per unit of one of its values, at one pose.
+/// Derivative of a table term for one value of its table: spline weight (M6) or bilinear weight (M7), times the factor.
 double table_weight(const TermSet& set, const Term<double>& term, std::size_t value, const HostModel& model,
                     const Linearisation<double, joint_count>& at, const Observation& row) {
   const Table& table = set.tables[term.table];
@@ -124,7 +124,7 @@ double table_weight(const TermSet& set, const Term<double>& term, std::size_t va
   return share(cell / table.columns, along_rows) * share(cell % table.columns, along_columns);
 }
 
-/// How the pose (at the origin of Ftool, in Fb) moves per unit of a parameter.
+/// Derivative of the pose (origin of Ftool, in Fb) for a parameter, Eq. (M20).
 Vector6<double> pose_column(const Parameter& parameter, const TermSet& set, const HostModel& model,
                             const Linearisation<double, joint_count>& at,
                             const LoadResponse<double, joint_count>& response, const Observation& row) {

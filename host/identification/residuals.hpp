@@ -40,24 +40,25 @@ struct Unknowns {
 /// Frame parameters of F and E that these rows can identify: 12, or 9 where no orientation was measured.
 std::vector<std::size_t> free_frames(const std::vector<Observation>& rows);
 
-/// Unwhitened residual of one row: e_p = p - p_model (m), e_R = log(R R_modelᵀ) (rad, zero where not measured), both in
+/// Residual of one row, Eq. (M31): e_p = p - p_model (m), e_R = log(R R_modelᵀ) (rad, zero where not measured), both in
 /// the measurement frame.
 struct RowResidual {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d orientation_rad = Eigen::Vector3d::Zero();
 };
 
-/// W * [e_p; e_R]: unit covariance.
+/// Whitened residual W [e_p; e_R], of unit covariance, Eq. (M22).
 Vector6<double> whitened(const Observation& row, const RowResidual& residual);
-/// Back to metres and radians.
+/// Inverse of whitened(): m and rad.
 Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened);
 
-/// Residuals of all rows, in their order.
+/// Residuals of all rows, in their order, Eq. (M31).
 std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows);
 
-/// Whitened residuals and minus their derivative: residual(x + dx) = residual - derivative * dx to first order, each row
-/// block six high (three of them zero for positions). Columns are scaled by unit_of(): dx counts in these units.
+/// Whitened residuals and minus their derivative, Eq. (M32): residual(x + dx) = residual - derivative * dx to
+/// first order, each row block six high (three of them zero for positions). Columns are scaled by unit_of(): dx
+/// counts in these units.
 struct Linearised {
   Eigen::VectorXd residual;
   Eigen::MatrixXd derivative;
@@ -66,22 +67,22 @@ struct Linearised {
 Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
                       const Unknowns& unknowns);
 
-/// Fixed scale of a parameter, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link
-/// gravity, the usual size of the effect otherwise (docs/model.md, section 7).
+/// Fixed unit of a parameter, SI: 0.05 degrees, 0.1 mm, 1e-5 rad/(N·m), 1e-3 rad for link gravity, else the usual size
+/// of the effect (docs/model.md, section 7).
 double unit_of(const Parameter& parameter, const TermSet& set);
 
 /// Units of all unknowns, frames first.
 Eigen::VectorXd units_of(const Unknowns& unknowns, const TermSet& set);
 
-/// Moves an estimate by dx, counted in units_of(); F and E on the manifold.
+/// Adds dx, in units_of(), to an estimate; F and E on the manifold.
 void move(Estimate& estimate, const Unknowns& unknowns, const Eigen::VectorXd& dx);
 
 /// Names of all unknowns, frames first: frame_f.x_mm … frame_e.rz_deg, then the parameters.
 std::vector<std::string> names_of(const Unknowns& unknowns);
 
-/// log(R): rotation vector, rad, of any rotation up to half a turn.
+/// Rotation vector log(R), rad; angle at most pi.
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation);
-/// exp(w)
+/// Rotation matrix exp(w). \param rotation_vector_rad  w, of any length
 Eigen::Matrix3d rotation_of(const Eigen::Vector3d& rotation_vector_rad);
 
 }  // namespace flexcomp::host

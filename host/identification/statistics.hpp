@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Error statistics of many rows, and chi-square.
+/// Error statistics of rows, chi-square, median.
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
 
@@ -11,7 +11,7 @@
 
 namespace flexcomp::host {
 
-/// Of the 3-D position error and, where orientations were measured, of the rotation angle.
+/// Mean, root mean square and maximum of the 3-D position error, m, and of the rotation angle, rad, where measured.
 struct ErrorStatistics {
   double mean_m = 0;
   double rms_m = 0;
@@ -22,14 +22,19 @@ struct ErrorStatistics {
 
 ErrorStatistics statistics(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows);
 
-/// Sum of squared whitened residuals.
+/// Chi-square: sum of squared whitened residuals, Eq. (M22).
 double chi_square(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows);
 
-/// Numbers measured: 6 per pose, 3 per position.
+/// Numbers measured by a row: 6 for a pose, 3 for a position.
+inline double measured_numbers(const Observation& row) { return row.has_orientation ? 6 : 3; }
+/// Sum over rows.
 double measured_numbers(const std::vector<Observation>& rows);
 
-/// Whether chi-square lies inside its two-sided 99.9 % interval.
+/// True where chi-square lies inside its two-sided 99.9 % interval.
 bool chi_square_is_usual(double chi2, double degrees_of_freedom);
+
+/// Median, the upper one of an even count; 0 of none.
+double median(std::vector<double> values);
 
 }  // namespace flexcomp::host
 

@@ -13,7 +13,7 @@ namespace flexcomp::host {
 
 namespace {
 
-/// r^T (1 + A A^T)^-1 r with A = whitened derivative * covariance factor, without forming the large matrix (Woodbury).
+/// Chi-square r^T (1 + A A^T)^-1 r by the Woodbury identity, Eq. (M42); A = whitened derivative * covariance factor.
 double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows, const Calibration& calibration,
                                    const Robot& robot) {
@@ -31,8 +31,7 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
       unknowns.frames.push_back(every_frame.frames[static_cast<std::size_t>(frame - frame_names.begin())]);
     } else if (parameter != parameters.end()) {
       unknowns.parameters.push_back(*parameter);
-    } else if (name.rfind("frame_", 0) !=
-               0) {  // a frame's angle that positions do not see may be absent here
+    } else if (name.rfind("frame_", 0) != 0) {  // positions do not identify all angles of the frames
       throw InputError(calibration.path, 0, "covariance_factor", "names of parameters of this file", name);
     }
   }

@@ -16,9 +16,9 @@ struct Validation {
   ErrorStatistics after;
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<RowResidual> nominal;    ///< before, in fitted frames where there are any, per row
-  /// After, over measured_numbers() (nothing is fitted here). Residuals are whitened by the noise of the rows and, where
-  /// the calibration has it, by the covariance of the estimate: parameters from 14 poses err by more than the
-  /// noise at other poses even where the model is right.
+  /// Chi-square after, Eq. (M42), with measured_numbers() degrees of freedom: nothing is fitted. The covariance
+  /// is that of the rows' noise plus, where the calibration has it, that of the estimate: even with a complete
+  /// model, parameters from 14 poses err by more than the noise at other poses.
   double chi2 = 0;
   double degrees_of_freedom = 0;
   std::vector<std::string> doubts;  ///< why the calibration must not be relied on; empty where it may be
@@ -26,12 +26,12 @@ struct Validation {
   double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : 0; }
 };
 
-/// Errors of the rows with the frames of the calibration (F = E = 1 where it has none).
+/// Computes errors before and after and chi-square, in the frames of the calibration (F = E = 1 where it has none).
 Validation validate(const Robot& robot, const Calibration& calibration, const std::vector<Observation>& rows,
                     const std::string& source);
 
-/// Errors of an arm that was driven with corrected commands, against the nominal model at the joint positions that the
-/// program commanded, in the frames of the calibration. Nothing is fitted.
+/// Errors of an arm that was driven with corrected commands: against the nominal model at the uncorrected
+/// commands, in the frames of the calibration. Nothing is fitted.
 ErrorStatistics errors_of_corrected(const Robot& robot, const Calibration& calibration,
                                     const std::vector<Observation>& rows);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From a model to what an instrument sees.
+/// Forward model of a measurement, Eq. (M1) and (M29).
 #ifndef FLEXCOMP_HOST_KINEMATICS_MEASURED_POSE_HPP
 #define FLEXCOMP_HOST_KINEMATICS_MEASURED_POSE_HPP
 
@@ -13,8 +13,8 @@
 
 namespace flexcomp::host {
 
-/// F · B A1 … A6 Tool · slip · E: the measured point or frame in the frame of the instrument. A slip of the measured point
-/// (reflector_slip) is a translation in Ftool.
+/// Measured point or frame in the frame of the instrument: F B A1 … A6 Tool T E, with T the translation of the measured
+/// point in Ftool by effects (reflector_slip).
 Pose<double> measured_pose(const HostModel& model, const Calibration& calibration,
                            const std::array<double, joint_count>& q_rad,
                            const Context<double, joint_count>& context);

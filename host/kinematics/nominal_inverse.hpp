@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Joint commands of the nominal arm for poses of its tool.
+/// Inverse kinematics of the nominal arm.
 #ifndef FLEXCOMP_HOST_KINEMATICS_NOMINAL_INVERSE_HPP
 #define FLEXCOMP_HOST_KINEMATICS_NOMINAL_INVERSE_HPP
 
@@ -14,18 +14,19 @@
 
 namespace flexcomp::host {
 
-/// Newton's method on the nominal chain from a seed, which chooses the branch. The result reaches the pose (Ftool in F0)
-/// within 1e-11 m and rad and lies within the joint limits; nothing where there is none near the seed.
+/// Solves the inverse kinematics by Newton's method from a seed, which selects the branch.
+/// \param target  Ftool in F0
+/// \return joint positions within the limits, which reach the pose to 1e-11 m and rad; nothing without convergence
 std::optional<std::array<double, joint_count>> nominal_inverse(
     const NominalRobot<joint_count>& robot, const Pose<double>& target,
     const std::array<double, joint_count>& seed_rad);
 
-/// All joint commands within the limits that reach the pose, those a whole turn apart included: Newton's method from many
-/// seeds, the same in every run. Along a singularity there are infinitely many; some of them are given.
+/// All solutions of the inverse kinematics within the limits, those a full turn apart included: Newton's method
+/// from 160 quasi-random seeds. At a singularity, with infinitely many solutions, some of them.
 std::vector<std::array<double, joint_count>> nominal_inverses(const NominalRobot<joint_count>& robot,
                                                               const Pose<double>& target);
 
-/// The joint command of every target. \throws InputError with the line of a pose that is not reached from its seed
+/// Joint command of every target. \throws InputError  with the line of a pose that is not reached from its seed
 std::vector<std::array<double, joint_count>> joint_commands(const TargetsFile& targets, const Robot& robot);
 
 }  // namespace flexcomp::host

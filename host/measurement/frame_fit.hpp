@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Where a tracker stands: its frame in the constructed base frame Fb, from points that are known in both.
+/// Pose of a tracker in the constructed base frame Fb, from points with nominal positions.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
 #define FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
 
@@ -13,18 +13,20 @@
 
 namespace flexcomp::host {
 
+/// Result of fit_frame().
 struct FrameFit {
-  Pose<double> pose;  ///< maps the tracker's frame to Fb; its position is the tracker, in Fb
-  /// Of [position, m; rotation vector log(R R_trueᵀ), rad], both in Fb. Far from the points the position is known the worse
-  /// and goes with the rotation.
+  Pose<double> pose;  ///< maps the tracker's frame to Fb
+  /// Covariance of [position, m; rotation vector log(R R_trueᵀ), rad], both in Fb, inverse of (M25). Far from
+  /// the points the position is uncertain and correlated with the rotation.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::vector<Eigen::Vector3d> residual_m;  ///< per point, nominal minus fitted, in Fb
-  double chi2 = 0;                          ///< their squares in units of sigma
+  double chi2 = 0;                          ///< sum of their squares in units of sigma
   double dof = 0;                           ///< of chi2: 3 n - 6
 };
 
-/// Weighted least squares over all points. `sigma_m`: standard deviation of each point per coordinate, of measurement and
-/// nominal place together. `source` is named in messages.
+/// Fits the tracker's frame by weighted least squares over all points, Eq. (M24).
+/// \param sigma_m  standard deviation of each point per coordinate, of measurement and nominal position together
+/// \param source   named in messages
 /// \throws InputError  fewer than three points; not as many nominal points and sigmas; a sigma that is not positive; all
 ///                     points on one line within a thousandth of its length
 FrameFit fit_frame(std::span<const Eigen::Vector3d> tracker_m, std::span<const Eigen::Vector3d> nominal_m,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Measured data: joint positions, what was measured there, and the context of each row.
+/// Measured data: joint readings, measurement and context of each row.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_MEASURED_DATA_HPP
 #define FLEXCOMP_HOST_MEASUREMENT_MEASURED_DATA_HPP
 
@@ -18,16 +18,16 @@ namespace flexcomp::host {
 
 enum class MeasurementKind { joints, position, pose, reflectors };  ///< joints: nothing measured
 
-/// One row. What was measured is in the measurement frame (of F, or any frame of the instrument).
+/// One row; positions and orientations are in the measurement frame (of F, or any frame of the instrument).
 struct Measurement {
   std::size_t line = 0;
   std::array<double, joint_count> q_rad{};  ///< joint readings
   Context<double, joint_count> context;     ///< with the defaults of the robot file where a column is absent
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< norm 1, w >= 0
+  /// Reflector points A, B, C(, D).
   std::array<Eigen::Vector3d, 4> reflector_m{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
-                                             Eigen::Vector3d::Zero(),
-                                             Eigen::Vector3d::Zero()};  ///< A, B, C(, D)
+                                             Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, joint_count> move_rad{};  ///< last motion of each joint, 0 where unknown
   double position_sigma_m = 0;                 ///< per axis of the position, or of each reflector point
   double orientation_sigma_rad = 0;            ///< per axis of the rotation vector
@@ -50,6 +50,7 @@ struct ContextColumns {
   bool all_directions() const;  ///< a direction column or a motion for every joint
 };
 
+/// Rows of one file.
 struct MeasuredData {
   std::string path;
   MeasurementKind kind = MeasurementKind::joints;
@@ -57,7 +58,7 @@ struct MeasuredData {
   std::vector<Measurement> rows;
   ContextColumns columns;
   std::vector<std::string> extra;     ///< names of columns without meaning here, passed through
-  std::vector<std::string> warnings;  ///< for people, complete sentences with file and column
+  std::vector<std::string> warnings;  ///< complete sentences with file and column
 };
 
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The measurement noise of the paper's simulations.
+/// Measurement noise of the paper's simulations.
 #ifndef FLEXCOMP_HOST_MEASUREMENT_NOISE_LEVEL_HPP
 #define FLEXCOMP_HOST_MEASUREMENT_NOISE_LEVEL_HPP
 

@@ -28,7 +28,7 @@ std::vector<Points> reflector_rows(const MeasuredData& data) {
   return rows;
 }
 
-/// The template in the order of the data's columns: the robot file's, or the mean shape of the data.
+/// Reflector template in the order of the data's columns: the robot file's, or the mean shape of the data.
 Points choose_template(const MeasuredData& data, const Robot& robot, const std::vector<Points>& rows) {
   if (robot.reflectors_m.empty()) return estimate_template(rows);
   if (robot.reflectors_m.size() < data.reflectors) {
@@ -44,8 +44,8 @@ Points choose_template(const MeasuredData& data, const Robot& robot, const std::
   return shape;
 }
 
-/// "reflector A", or all that it may have been with their probabilities.
-std::string moved(const Suspicion& suspicion) {
+/// "reflector A", or all candidates with their probabilities.
+std::string names_of_moved(const Suspicion& suspicion) {
   if (suspicion.several) return "more than one reflector";
   if (suspicion.named.size() == 1) return fmt::format("reflector {}", "ABCD"[suspicion.named[0]]);
   std::string text = "one of the reflectors";
@@ -57,9 +57,10 @@ std::string moved(const Suspicion& suspicion) {
   return text;
 }
 
-/// Names what slipped in these rows (indices, ascending). Rows that follow each other with the same shape show one slip.
-void warn(const MeasuredData& data, const Robot& robot, const std::vector<Points>& rows, const Points& shape,
-          const std::vector<std::size_t>& slipped, std::vector<std::string>& warnings) {
+/// Warns of moved reflectors in these rows (indices, ascending), once for consecutive rows of the same shape.
+void warn_of_slips(const MeasuredData& data, const Robot& robot, const std::vector<Points>& rows,
+                   const Points& shape, const std::vector<std::size_t>& slipped,
+                   std::vector<std::string>& warnings) {
   if (2 * slipped.size() > data.rows.size() && !robot.reflectors_m.empty()) {
     warnings.push_back(fmt::format(
         "{}: in {} of {} rows the distances between the reflectors are not those of {} (tool.reflectors_mm): "
@@ -86,7 +87,7 @@ void warn(const MeasuredData& data, const Robot& robot, const std::vector<Points
     warnings.push_back(fmt::format(
         "{}:{}: {} has moved or is badly seated: the distances to the others are off (misfit {:.3f} mm "
         "rms).",
-        data.path, lines, moved(suspect_reflectors(together, shape, sigma)),
+        data.path, lines, names_of_moved(suspect_reflectors(together, shape, sigma)),
         1e3 * std::sqrt(fit_rigid(mean, shape).squares_m2 / static_cast<double>(data.reflectors))));
     i = next;
   }
@@ -110,7 +111,7 @@ void observe_reflectors(const MeasuredData& data, const Robot& robot, std::vecto
     o.misfit_dof = 3 * data.reflectors - 6;
     if (misfit_probability(o.misfit_chi2, o.misfit_dof) < improbable) slipped.push_back(k);
   }
-  if (warnings != nullptr) warn(data, robot, rows, shape, slipped, *warnings);
+  if (warnings != nullptr) warn_of_slips(data, robot, rows, shape, slipped, *warnings);
 }
 
 }  // namespace

@@ -28,7 +28,15 @@ Points transformed(const Pose<double>& pose, std::span<const Eigen::Vector3d> po
   return out;
 }
 
-/// All points but one.
+/// Derivative of a point for [position; rotation vector] of its frame: dp + phi x r.
+Eigen::Matrix<double, 3, 6> point_jacobian(const Eigen::Vector3d& r) {
+  Eigen::Matrix<double, 3, 6> j;
+  j.leftCols<3>().setIdentity();
+  j.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
+  return j;
+}
+
+/// All points but one, and that one.
 struct Others {
   Points points;
   Eigen::Vector3d left_out;
@@ -42,16 +50,17 @@ Others apart(std::span<const Eigen::Vector3d> points, std::size_t leave) {
   return out;
 }
 
-/// Place of the left-out point along the line of the two others, from their middle, and off it.
-Eigen::Vector2d seen_from_line(const Others& o) {
+/// Cylindrical coordinates of the left-out point about the line of the two others: along it from their
+/// midpoint, radius.
+Eigen::Vector2d about_line(const Others& o) {
   const Eigen::Vector3d along = (o.points[1] - o.points[0]).normalized();
   const Eigen::Vector3d from_middle = o.left_out - (o.points[0] + o.points[1]) / 2;
   return {along.dot(from_middle), along.cross(from_middle).norm()};
 }
 
-/// Logarithm of how much a move of this point deforms the shape, per direction in which it does: what is left of the
-/// move when the best rigid motion is taken away.
-double log_visibility(std::span<const Eigen::Vector3d> points, std::size_t moved) {
+/// Logarithm of the product of singular values of the deformation by a motion of this point: the motion with the best
+/// rigid motion projected out.
+double log_sensitivity(std::span<const Eigen::Vector3d> points, std::size_t moved) {
   const auto rows = static_cast<Eigen::Index>(3 * points.size());
   const Eigen::Vector3d middle = centroid(points);
   double size = 0;
@@ -59,9 +68,7 @@ double log_visibility(std::span<const Eigen::Vector3d> points, std::size_t moved
   Eigen::MatrixXd rigid(rows, 6);
   for (std::size_t k = 0; k < points.size(); ++k) {
     const Eigen::Vector3d r = (points[k] - middle) / size;
-    auto block = rigid.middleRows<3>(static_cast<Eigen::Index>(3 * k));
-    block.leftCols<3>().setIdentity();
-    block.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
+    rigid.middleRows<3>(static_cast<Eigen::Index>(3 * k)) = point_jacobian(r);
   }
   const Eigen::MatrixXd q = orthogonal_factor(rigid);
   const Eigen::MatrixXd deformation =
@@ -123,8 +130,8 @@ Pose<double> reflector_frame(std::span<const Eigen::Vector3d> points_m) {
 
 Points estimate_template(const std::vector<Points>& rows_m) {
   Points shape = transformed(inverse(reflector_frame(rows_m.front())), rows_m.front());
-  // Every row is laid onto the mean and a new mean is taken. The first step already leaves only the square of the noise
-  // relative to the size; twenty are cheap.
+  // Each row is fitted to the mean, and a new mean is taken. One round leaves the square of the relative noise; at most
+  // twenty.
   for (int k = 0; k < 20; ++k) {
     Points sum(shape.size(), Eigen::Vector3d::Zero());
     for (const Points& row : rows_m) {
@@ -159,10 +166,7 @@ Eigen::Matrix<double, 6, 6> fit_information(const Pose<double>& pose,
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
   for (std::size_t k = 0; k < template_m.size(); ++k) {
     const Eigen::Vector3d r = pose.rotation * template_m[k];
-    // A point moves by dp + phi x r.
-    Eigen::Matrix<double, 3, 6> j;
-    j.leftCols<3>().setIdentity();
-    j.rightCols<3>() << 0, r.z(), -r.y(), -r.z(), 0, r.x(), r.y(), -r.x(), 0;
+    const Eigen::Matrix<double, 3, 6> j = point_jacobian(r);
     information += j.transpose() * j / (sigma_m[k] * sigma_m[k]);
   }
   return information;
@@ -180,7 +184,7 @@ Suspicion suspect_reflectors(const std::vector<Points>& rows_m, std::span<const 
   const std::size_t n = template_m.size();
   const Points shape = estimate_template(rows_m);
   const double sigma = sigma_m / std::sqrt(static_cast<double>(rows_m.size()));
-  // What a single one would have had to do, and what then remains to be noise.
+  // Likelihood of each reflector having moved: distance moved, and chi-square of the others.
   std::vector<double> log_weight(n);
   double least_chi2 = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < n; ++k) {
@@ -188,12 +192,12 @@ Suspicion suspect_reflectors(const std::vector<Points>& rows_m, std::span<const 
     const Others drawn = apart(template_m, k);
     const RigidFit fit = fit_rigid(measured.points, drawn.points);
     const double chi2 = fit.squares_m2 / (sigma * sigma);
-    // Two others leave a turn about their line open: only along and off that line can a move be seen.
+    // Two others leave the rotation about their line open: only the motion along and off that line is observable.
     const double move =
-        n == 3 ? (seen_from_line(measured) - seen_from_line(drawn)).norm()
+        n == 3 ? (about_line(measured) - about_line(drawn)).norm()
                : (measured.left_out - fit.pose.rotation * drawn.left_out - fit.pose.position).norm();
     const double directions = n == 3 ? 2 : 3;
-    log_weight[k] = -chi2 / 2 - directions * std::log(std::max(move, sigma)) - log_visibility(template_m, k);
+    log_weight[k] = -chi2 / 2 - directions * std::log(std::max(move, sigma)) - log_sensitivity(template_m, k);
     least_chi2 = std::min(least_chi2, chi2);
   }
   Suspicion out;
@@ -206,10 +210,10 @@ Suspicion suspect_reflectors(const std::vector<Points>& rows_m, std::span<const 
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t i, std::size_t j) { return out.probability[i] > out.probability[j]; });
-  double held = 0;
+  double sum_named = 0;
   for (const std::size_t k : order) {
-    if (held >= 0.99) break;
-    held += out.probability[k];
+    if (sum_named >= 0.99) break;
+    sum_named += out.probability[k];
     out.named.push_back(k);
   }
   return out;

@@ -8,6 +8,7 @@
 
 #include "distributions.hpp"
 #include "linalg/decompositions.hpp"
+#include "quaternion.hpp"
 
 namespace flexcomp::host {
 
@@ -17,7 +18,8 @@ constexpr double same_reading_rad = 1e-9;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-bool repeat(const Observation& a, const Observation& b) {
+/// True where two rows have the same joint readings and context.
+bool same_pose(const Observation& a, const Observation& b) {
   for (std::size_t j = 0; j < joint_count; ++j) {
     if (std::abs(a.q_rad[j] - b.q_rad[j]) > same_reading_rad) return false;
   }
@@ -26,11 +28,6 @@ bool repeat(const Observation& a, const Observation& b) {
   return a.has_orientation == b.has_orientation && x.payload_kg == y.payload_kg &&
          x.payload_com_m == y.payload_com_m && x.force_n == y.force_n && x.temperature_c == y.temperature_c &&
          x.time_s == y.time_s && x.direction == y.direction && x.relative_speed == y.relative_speed;
-}
-
-Eigen::Vector3d rotation_between(const Eigen::Matrix3d& to, const Eigen::Matrix3d& from) {
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(to * from.transpose()));
-  return turn.angle() * turn.axis();
 }
 
 /// Deviations of one group from a common pose near all of them: its mean to first order in the scatter.
@@ -54,7 +51,7 @@ std::vector<Vector6d> deviations(const std::vector<Observation>& rows,
   return out;
 }
 
-/// Squares about the mean of a group, weighted by the declared noise as a fit would: exactly chi-square distributed with
+/// Sum of squares about the weighted mean of a group, whitened by the declared noise: chi-square distributed with
 /// (size - 1) * numbers degrees of freedom where that noise is right.
 double whitened_squares(const std::vector<Observation>& rows, const std::vector<std::size_t>& group,
                         const std::vector<Vector6d>& e) {
@@ -75,7 +72,7 @@ double whitened_squares(const std::vector<Observation>& rows, const std::vector<
 }
 
 /// Declared covariance of one row; zero where not measured.
-Matrix6d declared(const Observation& row) {
+Matrix6d declared_covariance(const Observation& row) {
   Matrix6d covariance = Matrix6d::Zero();
   const Eigen::Index n = row.has_orientation ? 6 : 3;
   const Eigen::MatrixXd w = row.whitening.topLeftCorner(n, n);
@@ -83,8 +80,9 @@ Matrix6d declared(const Observation& row) {
   return covariance;
 }
 
-/// Degrees of freedom of a sum of squares of three axes that need not be alike (Satterthwaite): three per free row where
-/// they are. The shape of the declared noise is taken, not the estimated one, which a few rows leave wild.
+/// Effective degrees of freedom of a sum of squares over three axes of unequal variance (Satterthwaite); three
+/// per free row for equal ones. The declared covariance is used: the estimated one is too uncertain with few
+/// rows.
 class SquaresOfAxes {
  public:
   void add(const Eigen::Matrix3d& covariance, double free_rows) {
@@ -124,7 +122,7 @@ std::vector<std::vector<std::size_t>> repeats(const std::vector<Observation>& ro
     std::vector<std::size_t> group{order[i]};
     for (std::size_t j = i + 1; j < order.size(); ++j) {
       if (rows[order[j]].q_rad[0] - first.q_rad[0] > same_reading_rad) break;
-      if (taken[order[j]] || !repeat(first, rows[order[j]])) continue;
+      if (taken[order[j]] || !same_pose(first, rows[order[j]])) continue;
       taken[order[j]] = true;
       group.push_back(order[j]);
     }
@@ -150,7 +148,7 @@ std::optional<PureError> pure_error(const std::vector<Observation>& rows, double
     Matrix6d noise = Matrix6d::Zero();
     for (std::size_t i = 0; i < group.size(); ++i) {
       out.covariance += (e[i] - mean) * (e[i] - mean).transpose();
-      noise += declared(rows[group[i]]) / static_cast<double>(e.size());
+      noise += declared_covariance(rows[group[i]]) / static_cast<double>(e.size());
     }
     const double freed = static_cast<double>(group.size() - 1);
     position.add(noise.topLeftCorner<3, 3>(), freed);

@@ -9,21 +9,21 @@ namespace flexcomp::host {
 
 namespace {
 
-/// Rounding of an update is about 1e-16 times the condition of M, and adds up.
+/// An update rounds by about 1e-16 times the condition of M, and the errors accumulate.
 constexpr int updates_per_refresh = 32;
 
-/// Where a pose takes nearly all that is known of some direction with it, or brings it, the inverse changes by orders of
-/// magnitude and an update keeps few digits: then from scratch.
+/// True where an update changes the information of some direction by orders of magnitude, which costs its digits:
+/// refactorise then.
 bool loses_digits(const Llt& llt) {
   const Eigen::VectorXd diagonal = llt.diagonal();
   return !llt.is_positive_definite() || diagonal.minCoeff() < 1e-2 || diagonal.maxCoeff() > 1e2;
 }
 
-/// log det of G = 1 + a, and tr(G⁻¹ s), for symmetric a and s.
+/// Computes log det G and tr(G⁻¹ S) for symmetric G and S.
 template <int R>
 void small_solve(const Eigen::Matrix<double, R, R>& g, const Eigen::Matrix<double, R, R>& s, double& log_det,
                  double& trace) {
-  // Cholesky of G by hand: R is 3 or 6, and this runs for every candidate.
+  // Cholesky decomposition of G, unrolled for R = 3 or 6: this runs for every candidate.
   Eigen::Matrix<double, R, R> l = g;
   double det = 1;
   for (int j = 0; j < R; ++j) {
@@ -39,7 +39,7 @@ void small_solve(const Eigen::Matrix<double, R, R>& g, const Eigen::Matrix<doubl
     }
   }
   log_det = std::log(det);
-  // tr(G⁻¹ S) = tr(L⁻¹ S L⁻ᵀ): solve for the columns, then for the rows of which only the diagonal counts.
+  // tr(G⁻¹ S) = tr(L⁻¹ S L⁻ᵀ): solve for the columns, then for the diagonal of the rows.
   Eigen::Matrix<double, R, R> x = s;
   for (int c = 0; c < R; ++c) {
     for (int i = 0; i < R; ++i) {
@@ -50,7 +50,7 @@ void small_solve(const Eigen::Matrix<double, R, R>& g, const Eigen::Matrix<doubl
   }
   trace = 0;
   for (int i = 0; i < R; ++i) {
-    // Row i of L⁻¹ S, times L⁻ᵀ, up to its i-th number.
+    // Row i of L⁻¹ S, times L⁻ᵀ, up to element i.
     for (int c = 0; c <= i; ++c) {
       double v = x(i, c);
       for (int k = 0; k < c; ++k) v -= l(c, k) * x(i, k);
@@ -154,7 +154,7 @@ Figures Information::with(const Block& h) const {
 
 void Information::with_each(const Eigen::MatrixXd& blocks, Eigen::Index rows,
                             std::vector<Figures>& out) const {
-  constexpr Eigen::Index at_once = 64;  // poses: what fits into the nearest cache
+  constexpr Eigen::Index at_once = 64;  // poses: fits into the first-level cache
   const Eigen::Index count = blocks.cols() / rows;
   out.resize(static_cast<std::size_t>(count));
   Eigen::MatrixXd vh(blocks.rows(), at_once * rows);

@@ -6,7 +6,7 @@
 ///   O1 = det(M)^(1/2L) / √n                 (Borm and Menq: geometric mean of the singular values of H, per √pose)
 ///   Omin, expected = tr(M⁻¹)                (mean over the noise of the squared errors in units; Eq. 30 needs the truth)
 ///   fitness = Omin, expected / O1           (Eq. 33; smaller is better)
-/// Where the frames of the measurement are fitted too, M is its Schur complement: what is left for the parameters.
+/// Equations (M43) to (M46). Where the frames are fitted too, M is its Schur complement without them, (M45).
 #ifndef FLEXCOMP_HOST_PLANNING_CRITERION_HPP
 #define FLEXCOMP_HOST_PLANNING_CRITERION_HPP
 
@@ -18,7 +18,7 @@
 
 namespace flexcomp::host {
 
-/// Objective that a search minimises.
+/// Objective of a search, to be minimised.
 enum class Goal {
   dual,       ///< fitness: Omin, expected / O1
   d_optimal,  ///< 1 / O1 alone, the objective of DETMAX
@@ -30,24 +30,24 @@ struct Figures {
   double log_det = 0;  ///< of M
 };
 
-/// The criterion of a set of `poses` poses for `parameters` unknowns.
+/// Criterion of a set of `poses` poses for `parameters` unknowns.
 struct Criterion {
   Eigen::Index parameters = 0;
   double poses = 0;
   Goal goal = Goal::dual;
 
-  double o1(const Figures& f) const;
-  double fitness(const Figures& f) const;    ///< Omin, expected / O1
+  double o1(const Figures& f) const;         ///< observability index O1, (M43)
+  double fitness(const Figures& f) const;    ///< Omin, expected / O1, (M46)
   double log_score(const Figures& f) const;  ///< logarithm of the objective
 };
 
-/// M and its inverse. Rank-r updates; rebuilt from M where rounding would add up.
+/// Information matrix M and its inverse by rank-r updates; refactorised from M before rounding accumulates.
 class Information {
  public:
-  /// Starts from a prior: `prior` on the diagonal (1/σ² in units), so that M is invertible with too few poses too.
+  /// Starts from `prior` on the diagonal (1/σ² in units), with which M is invertible for any number of poses.
   Information(Eigen::Index nuisance, Eigen::Index parameters, double prior);
 
-  /// M from scratch (without the prior).
+  /// Sets M (without the prior) and factorises it.
   void assign(const Eigen::MatrixXd& m);
   void add(const Block& h) { update(h, 1); }
   void remove(const Block& h) { update(h, -1); }
@@ -60,12 +60,12 @@ class Information {
   Eigen::Index nuisance() const { return v_nuisance_.rows(); }
   Eigen::Index parameters() const { return unknowns() - nuisance(); }
 
-  /// The figures of M + HHᵀ, without changing anything.
+  /// Trace and determinant of M + HHᵀ; M stays.
   Figures with(const Block& h) const;
-  /// The same for many blocks of `rows` columns that stand side by side.
+  /// The same for many blocks of `rows` columns side by side.
   void with_each(const Eigen::MatrixXd& blocks, Eigen::Index rows, std::vector<Figures>& out) const;
 
-  /// Derivative of log score for M (frames included): d log score = Σ gradient ∘ dM.
+  /// Derivative of the log score with respect to M (frames included): d log score = Σ gradient ∘ dM.
   Eigen::MatrixXd gradient(const Criterion& criterion) const;
 
  private:
@@ -85,12 +85,12 @@ class Information {
 /// Σ HHᵀ of blocks.
 Eigen::MatrixXd sum_of_squares(const std::vector<Block>& blocks, Eigen::Index unknowns);
 
-/// The figures of a set from scratch and without any prior: by an orthogonal decomposition of H, no normal equations.
-/// Nothing where H does not have full column rank to 1e-10.
+/// Trace and determinant of a set by QR decomposition of H, without prior and normal equations; full_rank is
+/// false where H does not have full column rank to 1e-10.
 struct ExactFigures {
   bool full_rank = false;
   Figures figures;
-  Eigen::VectorXd sigma;  ///< of each parameter, in units
+  Eigen::VectorXd sigma;  ///< standard deviation of each parameter, in units
 };
 ExactFigures exact_figures(const std::vector<Block>& blocks, Eigen::Index nuisance);
 

@@ -9,13 +9,13 @@ namespace flexcomp::host {
 
 namespace {
 
-/// A set on an excursion: its candidates, with repeats, and what they know.
+/// A set during an excursion: its candidates, with repeats, and their information matrix.
 struct Excursion {
   std::vector<std::size_t> chosen;
   Information information;
 };
 
-/// Mitchell's failure list: sets from which an excursion came back without a gain; they are left in the other direction.
+/// Mitchell's failure list: sets from which an excursion returned without a gain; they are left in the other direction.
 using Failures = std::set<std::vector<std::size_t>>;
 
 std::vector<std::size_t> sorted(std::vector<std::size_t> v) {
@@ -65,9 +65,9 @@ double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector
   for (;;) {
     Excursion e = best;
     Failures passed;
-    bool came_back = false;
-    while (!came_back) {
-      // At its own size the excursion starts either way; elsewhere it heads back, unless that was tried in vain.
+    bool returned = false;
+    while (!returned) {
+      // At size n the direction is random; elsewhere the excursion returns, unless the failure list has the set.
       bool grow = e.chosen.size() == n ? uniform(random) < 0.5 : e.chosen.size() < n;
       if (e.chosen.size() != n) {
         const std::vector<std::size_t> here = sorted(e.chosen);
@@ -81,17 +81,17 @@ double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector
         remove_least(pool, e, evaluations);
       }
       if (e.chosen.size() > n + farthest || e.chosen.size() + farthest < n) break;
-      came_back = e.chosen.size() == n;
+      returned = e.chosen.size() == n;
     }
-    if (came_back && e.information.figures().log_det > best.information.figures().log_det + least_gain) {
+    if (returned && e.information.figures().log_det > best.information.figures().log_det + least_gain) {
       best = e;
       failures.clear();
       continue;
     }
     const std::size_t before = failures.size();
     failures.insert(passed.begin(), passed.end());
-    // The excursion went beyond its bound, or taught nothing new: there is nothing left to try.
-    if (!came_back || failures.size() == before) break;
+    // Stop: the excursion exceeded its bound, or added no set to the failure list.
+    if (!returned || failures.size() == before) break;
   }
   chosen = best.chosen;
   return problem.criterion(Goal::d_optimal).log_score(best.information.figures());

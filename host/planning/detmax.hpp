@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// DETMAX (Mitchell 1974): D-optimal sets by excursions, in which the set grows and shrinks by several poses before it
-/// comes back to its size. The baseline of the paper's Fig. 8.
+/// \file DETMAX (Mitchell 1974): D-optimal sets by excursions, which grow and shrink the set by several poses
+/// and return to its size. The baseline of Chen's Fig. 8.
 #ifndef FLEXCOMP_HOST_PLANNING_DETMAX_HPP
 #define FLEXCOMP_HOST_PLANNING_DETMAX_HPP
 
@@ -12,7 +11,7 @@
 
 namespace flexcomp::host {
 
-/// Excursions from `chosen` until none of them raises det M; returns the logarithm of 1/O1, which never grows.
+/// Improves `chosen` by excursions until none raises det M; returns log(1/O1), which never grows.
 /// \param farthest  largest difference of an excursion from the set's size, poses (Mitchell: 6)
 double detmax(const PlanProblem& problem, const CandidatePool& pool, std::vector<std::size_t>& chosen,
               std::mt19937_64& random, std::uint64_t& evaluations, std::size_t farthest = 6);
@@ -23,7 +22,7 @@ struct DetmaxOptions {
   std::uint64_t seed = 1;
 };
 
-/// Restarts of detmax() on one pool. The best is the one with the largest determinant, whatever its dual index.
+/// Restarts detmax() on one pool and keeps the set of the largest determinant.
 class DetmaxSearch : public Search {
  public:
   DetmaxSearch(const PlanProblem& problem, const DetmaxOptions& options);

@@ -11,7 +11,7 @@ namespace {
 /// Gains below this are rounding.
 constexpr double least_gain = 1e-10;
 
-/// A symmetric matrix as a vector, such that the dot product of packed(w) and packed_twice(m) is tr(W M).
+/// Packs a symmetric matrix into a vector, such that the dot product of packed(w) and packed_twice(m) is tr(W M).
 Eigen::VectorXd packed(const Eigen::MatrixXd& w) {
   Eigen::VectorXd out(w.rows() * (w.rows() + 1) / 2);
   Eigen::Index k = 0;
@@ -27,7 +27,7 @@ Eigen::VectorXd packed_twice(const Eigen::MatrixXd& m) {
   return packed(twice);
 }
 
-/// 5 kB each.
+/// Limit of CandidatePool::squares, 5 kB each.
 constexpr std::size_t most_squares = 20000;
 
 }  // namespace
@@ -90,11 +90,10 @@ double exchange(const PlanProblem& problem, const CandidatePool& pool, const Cri
   if (!pool.may_repeat) {
     for (const std::size_t c : chosen) taken[c] = 1;
   }
-  // The log score is convex in M: with its gradient W, a set in which M_c stands for M_k scores at least
-  // score + tr(W (M_c - M_k)). So only candidates with tr(W M_c) < tr(W M_k) can gain anything, and near the end these
-  // are few. W changes only with the set.
+  // The log score is convex in M: with its gradient W, replacing M_k by M_c scores at least score + tr(W (M_c - M_k)).
+  // Hence only candidates with tr(W M_c) < tr(W M_k) can gain, few near the end. W changes only with the set.
   Eigen::VectorXd slope;
-  const auto take_slope = [&] {
+  const auto update_slope = [&] {
     const Eigen::MatrixXd w = now.gradient(criterion);
     slope.resize(static_cast<Eigen::Index>(pool.size()));
     if (pool.squares.cols() == slope.size()) {
@@ -107,7 +106,7 @@ double exchange(const PlanProblem& problem, const CandidatePool& pool, const Cri
     }
     evaluations += pool.size();
   };
-  take_slope();
+  update_slope();
   std::size_t unchanged = 0;
   for (int round = 0; round < most_rounds && unchanged < chosen.size(); ++round) {
     for (std::size_t k = 0; k < chosen.size() && unchanged < chosen.size(); ++k) {
@@ -135,7 +134,7 @@ double exchange(const PlanProblem& problem, const CandidatePool& pool, const Cri
       rest.add(blocks[k]);
       now = rest;
       score = criterion.log_score(now.figures());
-      take_slope();
+      update_slope();
       unchanged = 0;
     }
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// Exchange among candidates (Fedorov; Cook and Nachtsheim): every pose of the set in turn is taken out and the best
-/// candidate put in its place, until a full pass changes nothing.
+/// \file Exchange algorithm (Fedorov; Cook and Nachtsheim): each pose of the set in turn is replaced by the
+/// best candidate, until a full pass changes nothing.
 #ifndef FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
 #define FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
 
@@ -16,7 +15,7 @@ namespace flexcomp::host {
 struct CandidatePool {
   PoseSet poses;
   Eigen::MatrixXd blocks;
-  Eigen::MatrixXd squares;  ///< HHᵀ of each as a column, one triangle; none where there are very many
+  Eigen::MatrixXd squares;  ///< HHᵀ of each as a column, one triangle; empty above 20,000 candidates
   Eigen::Index rows = 6;    ///< numbers measured per pose
   bool may_repeat = true;   ///< one candidate may be chosen several times
 
@@ -30,8 +29,8 @@ CandidatePool make_pool(const PlanProblem& problem, std::size_t count, std::mt19
 /// Indices of distinct random candidates; with repeats only where there are too few.
 std::vector<std::size_t> random_choice(const CandidatePool& pool, std::size_t count, std::mt19937_64& random);
 
-/// Exchanges until nothing changes (or `most_rounds`); `chosen` is the start and receives the result. Returns the log
-/// score of `criterion`, which never grows.
+/// Exchanges poses of `chosen` until nothing changes (or `most_rounds`). Returns the log score of `criterion`,
+/// which never grows.
 double exchange(const PlanProblem& problem, const CandidatePool& pool, const Criterion& criterion,
                 std::vector<std::size_t>& chosen, std::uint64_t& evaluations, int most_rounds = 1000);
 
@@ -45,7 +44,7 @@ struct ExchangeOptions {
   std::uint64_t seed = 1;
 };
 
-/// Restarts of exchange() on one pool; each step is one restart.
+/// Restarts exchange() on one pool; each step is one restart.
 class ExchangeSearch : public Search {
  public:
   ExchangeSearch(const PlanProblem& problem, const ExchangeOptions& options);

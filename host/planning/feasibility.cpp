@@ -23,22 +23,23 @@ constexpr std::size_t sample_count = 4096;
 constexpr std::uint64_t sample_seed = 1;
 constexpr double not_tested = -1;
 
+/// Random joint positions, uniform within the limits.
 class RandomPoses {
  public:
   RandomPoses(const std::array<JointLimits, joint_count>& limits, std::uint64_t seed) : random_(seed) {
     for (std::size_t j = 0; j < joint_count; ++j) {
-      reading_[j] = std::uniform_real_distribution<double>(limits[j].min_rad, limits[j].max_rad);
+      position_[j] = std::uniform_real_distribution<double>(limits[j].min_rad, limits[j].max_rad);
     }
   }
   Joints operator()() {
     Joints q;
-    for (std::size_t j = 0; j < joint_count; ++j) q[j] = reading_[j](random_);
+    for (std::size_t j = 0; j < joint_count; ++j) q[j] = position_[j](random_);
     return q;
   }
 
  private:
   std::mt19937_64 random_;
-  std::array<std::uniform_real_distribution<double>, joint_count> reading_;
+  std::array<std::uniform_real_distribution<double>, joint_count> position_;
 };
 
 bool nearer(double squared_m2, double clearance_m) {
@@ -77,8 +78,8 @@ Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
   centre_ = Eigen::Vector3d(robot.nominal.tool_xyz_m.data());
   normal_ = tool.col(2);
   for (const Eigen::Vector3d& r : robot.reflectors_m) reflector_.emplace_back(centre_ + tool * r);
-  stand_in_ = reflector_.empty();
-  if (stand_in_) reflector_.push_back(centre_);
+  tool_point_only_ = reflector_.empty();
+  if (tool_point_only_) reflector_.push_back(centre_);
   for (const Eigen::Vector3d& r : reflector_) tool_radius_m_ = std::max(tool_radius_m_, (r - centre_).norm());
 
   const Cell settings = cell.value_or(Cell());
@@ -102,15 +103,14 @@ Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
 
   if (robot.capsules.empty()) {
     warnings_.push_back(
-        fmt::format("{}: no capsules: the arm has no bodies, so that it cannot be in the way.", robot.path));
+        fmt::format("{}: no capsules: the arm has no bodies, collisions are not tested.", robot.path));
   }
   if (!tracker_m_) {
     warnings_.push_back(fmt::format("{}: no tracker_mm: neither beam nor angle of the reflectors is tested.",
                                     cell ? cell->path : "no cell file"));
-  } else if (stand_in_) {
-    warnings_.push_back(fmt::format(
-        "{}: no tool.reflectors_mm: the tool point stands for the reflector that the tracker sees.",
-        robot.path));
+  } else if (tool_point_only_) {
+    warnings_.push_back(
+        fmt::format("{}: no tool.reflectors_mm: the tool point is tested as the reflector.", robot.path));
   }
   for (Body& body : bodies_) body.half_length_m = (body.capsule.to_m - body.capsule.from_m).norm() / 2;
   std::vector<LinkFrames> samples(bodies_.empty() ? 0 : sample_count);
@@ -121,7 +121,7 @@ Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
   warn_of_tracker();
 }
 
-/// Bodies of the arm that may meet each other or an obstacle.
+/// Selects the pairs of bodies whose distance depends on the joints and may fall below their radii.
 void Feasibility::choose_pairs(const Robot& robot, const std::vector<LinkFrames>& samples) {
   std::array<bool, joint_count + 1> occupied{};
   for (const Capsule& capsule : robot.capsules) occupied[capsule.frame] = true;
@@ -156,18 +156,18 @@ void Feasibility::choose_pairs(const Robot& robot, const std::vector<LinkFrames>
   }
 }
 
-/// How near tool and beams may come to each body.
+/// Sets the clearance of reflectors, arms and beams from each body, Eq. (M48), relaxed where no pose can keep it.
 void Feasibility::choose_clearances(const std::vector<LinkFrames>& samples) {
   for (Body& body : bodies_) {
     const bool moves_with_tool = body.capsule.frame == joint_count;
-    const bool stands = body.capsule.frame == 0;
+    const bool is_fixed = body.capsule.frame == 0;
     const double radius = body.capsule.radius_m;
     const std::array<double, 3> factors{safety_, std::min(safety_, 1.0), 0};
     std::array<std::vector<std::string>, 4> kept;  // by factor, the last: not tested
     const auto clearance = [&](double most, const std::string& part) {
       for (std::size_t n = 0; n < factors.size(); ++n) {
         const double needed = radius + factors[n] * smr_radius_m_;
-        if (!stands && !(most > needed)) continue;
+        if (!is_fixed && !(most > needed)) continue;
         kept[n].push_back(part);
         return needed;
       }
@@ -177,16 +177,16 @@ void Feasibility::choose_clearances(const std::vector<LinkFrames>& samples) {
     for (std::size_t k = 0; k < reflector_.size(); ++k) {
       double reflector = 0;
       double arm = 0;
-      for (std::size_t n = 0; !stands && n < samples.size(); ++n) {
+      for (std::size_t n = 0; !is_fixed && n < samples.size(); ++n) {
         const Segment axis = placed(body, samples[n]);
-        const Segment spoke{placed(centre_, samples[n]), placed(reflector_[k], samples[n])};
-        reflector = std::max(reflector, squared_distance(spoke.to, axis));
-        arm = std::max(arm, squared_distance(spoke, axis));
+        const Segment arm_axis{placed(centre_, samples[n]), placed(reflector_[k], samples[n])};
+        reflector = std::max(reflector, squared_distance(arm_axis.to, axis));
+        arm = std::max(arm, squared_distance(arm_axis, axis));
       }
       body.beam_clearance_m.push_back(
           tracker_m_ || !moves_with_tool ? clearance(std::sqrt(reflector), reflector_name(k)) : not_tested);
       body.reflector_clearance_m.push_back(moves_with_tool ? not_tested : body.beam_clearance_m.back());
-      body.arm_clearance_m.push_back(moves_with_tool || stand_in_
+      body.arm_clearance_m.push_back(moves_with_tool || tool_point_only_
                                          ? not_tested
                                          : clearance(std::sqrt(arm), fmt::format("arm {}", "ABCD"[k])));
     }
@@ -222,7 +222,7 @@ void Feasibility::warn_of_tracker() {
 }
 
 std::string Feasibility::reflector_name(std::size_t k) const {
-  return stand_in_ ? "the tool point" : fmt::format("reflector {}", "ABCD"[k]);
+  return tool_point_only_ ? "the tool point" : fmt::format("reflector {}", "ABCD"[k]);
 }
 
 void Feasibility::place(const Joints& q_rad, LinkFrames& frames) const {
@@ -261,14 +261,14 @@ bool Feasibility::find_facing(const LinkFrames& frames, Finding& finding) const 
   return false;
 }
 
-bool Feasibility::find_touch(const Axes& axes, Finding& finding) const {
+bool Feasibility::find_collision(const Axes& axes, Finding& finding) const {
   for (const Pair& pair : pairs_) {
     const Body& a = bodies_[pair.first];
     const Body& b = bodies_[pair.second];
     const Segment& at = axes[pair.first];
     const Segment& bt = axes[pair.second];
     const double needed = a.capsule.radius_m + b.capsule.radius_m;
-    // Balls around the bodies' middles first: most pairs are far apart.
+    // Bounding spheres first: most pairs are far apart.
     const double apart = 0.25 * (at.from + at.to - bt.from - bt.to).squaredNorm();
     if (!nearer(apart, needed + a.half_length_m + b.half_length_m)) continue;
     const double square = squared_distance(at, bt);
@@ -310,7 +310,7 @@ bool Feasibility::find_beam(const LinkFrames& frames, const Axes& axes, Finding&
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
     const Segment& axis = axes[i];
-    // At the same fraction of their ways no beam is farther from the one to the tool's centre than this.
+    // At the same fraction of their lengths no beam is farther from the one to the tool's centre than tool_radius_m_.
     if (!nearer(squared_distance(middle, axis), body.largest_clearance_m + tool_radius_m_)) continue;
     for (std::size_t k = 0; k < reflector_.size(); ++k) {
       if (body.beam_clearance_m[k] < 0) continue;
@@ -335,10 +335,10 @@ Feasibility::Finding Feasibility::find(const Joints& q_rad) const {
   LinkFrames frames;
   place(q_rad, frames);
   if (tracker_m_ && find_facing(frames, finding)) return finding;
-  thread_local Axes axes;  // called a million times: keeps its memory
+  thread_local Axes axes;  // called a million times: no allocation
   axes.clear();
   for (const Body& body : bodies_) axes.push_back(placed(body, frames));
-  if (find_touch(axes, finding) || find_tool(frames, axes, finding)) return finding;
+  if (find_collision(axes, finding) || find_tool(frames, axes, finding)) return finding;
   if (tracker_m_) find_beam(frames, axes, finding);
   return finding;
 }
@@ -393,8 +393,7 @@ std::vector<Joints> feasible_poses(const Feasibility& feasibility, const Robot& 
                     name_of(static_cast<Obstruction>(k)));
   }
   throw InputError(
-      feasibility.source(), 0, "",
-      fmt::format("a cell that leaves room for {} poses of {}", count, robot.path),
+      feasibility.source(), 0, "", fmt::format("a cell with {} feasible poses of {}", count, robot.path),
       fmt::format("{} among {} random poses within the joint limits{}", poses.size(), tries, reasons));
 }
 

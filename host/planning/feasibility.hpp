@@ -31,22 +31,22 @@ enum class Obstruction {
   facing_away     ///< the beam comes in at a larger angle than a reflector accepts
 };
 
-/// "beam blocked" and so on, for messages.
+/// Text of an obstruction for messages: "beam blocked".
 std::string name_of(Obstruction obstruction);
 
-/// Tests single poses of the nominal arm. What is tested against what:
+/// Tests single poses of the nominal arm for feasibility, Eq. (M48) and (M49), radii r_i of bodies, r_s of a reflector:
 ///
-/// - *Beam and angle*, where the cell has a tracker: every reflector must be seen. The beam's angle to -N (N is +Z of
-///   Ftool) is at most the acceptance, and the segment from the tracker to the reflector keeps more than
-///   r_i + s * r_s from every body's axis. Arms of the tool do not block beams.
-/// - *Tool*: reflectors, and arms from the origin of Ftool to each of them, keep more than r_i + s * r_s from every body.
-///   A tool without reflectors is its tool point, which is then what the tracker sees. Bodies on frame 6 move with the
-///   tool and are not tested against it; what else is bolted to the flange, a tool's stem or a gripper, can be one.
-/// - *Mounted near*: where no pose at all lets a reflector (or an arm) keep s from a body of the arm, because the tool is
-///   bolted on beside it, that pair - and this reflector's beam at that body - has to keep 1 instead of s, the ball
-///   itself; if no pose allows that either, 0: not inside the body; and where even this is never so, it is not tested. A
-///   warning says so. (The reference tool on the TX60L: reflector A is 138 mm from the wrist's centre at every pose, and
-///   95 + 3 * 19.05 mm would be 152.) Obstacles and bodies on frame 0 get no such allowance.
+/// - *Beam and angle*, where the cell has a tracker: every reflector must be visible. The beam's angle to -N (N
+///   is +Z of Ftool) is at most the acceptance, and the segment from the tracker to the reflector keeps more
+///   than r_i + s * r_s from every body's axis. Arms of the tool do not block beams.
+/// - *Tool*: reflectors, and arms from the origin of Ftool to each of them, keep more than r_i + s * r_s from
+///   every body. A tool without reflectors is tested with its tool point as the reflector. Bodies on frame 6 (a
+///   gripper, say) move with the tool and are not tested against it.
+/// - *Mounted near*: where no pose lets a reflector (or an arm) keep s from a body of the arm, because the tool
+///   is mounted beside it, that pair - and this reflector's beam at that body - has to keep 1 instead of s, the
+///   reflector itself; if no pose allows that either, 0: not inside the body; else it is not tested. A warning
+///   says so. (The reference tool on the TX60L: reflector A is 138 mm from the wrist's centre at every pose,
+///   and 95 + 3 * 19.05 mm would be 152.) Obstacles and bodies on frame 0 get no such allowance.
 /// - *Arm*: bodies keep more than r_i + r_j from each other and from obstacles. Left out are bodies of the same frame;
 ///   neighbours (no frame between theirs has a body), which overlap at their joint; pairs that touch at every pose, as
 ///   fat bodies around a joint do; bodies on frame 0 against obstacles, and any other pair whose distance no joint changes.
@@ -62,9 +62,9 @@ class Feasibility {
   bool allows(const std::array<double, joint_count>& q_rad) const {
     return check(q_rad) == Obstruction::none;
   }
-  /// One sentence with names and figures; empty where the pose is feasible.
+  /// Describes the obstruction in one sentence with names and figures; empty where the pose is feasible.
   std::string why(const std::array<double, joint_count>& q_rad) const;
-  /// What is not tested, or less strictly than the files ask. Complete sentences.
+  /// Tests that are left out or relaxed, in complete sentences.
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// The cell file, or the robot file where there is no cell.
   const std::string& source() const { return source_; }
@@ -75,8 +75,8 @@ class Feasibility {
     std::string name;
     bool obstacle = false;
     double half_length_m = 0;
-    double largest_clearance_m = 0;  ///< of all below
-    /// Per reflector, m: what reflector and beam, and the arm to it, keep from the axis; below 0: not tested.
+    double largest_clearance_m = 0;  ///< upper bound of the clearances below
+    /// Clearances from the axis per reflector, m, of the reflector, its beam and its arm; below 0: not tested.
     std::vector<double> reflector_clearance_m;
     std::vector<double> beam_clearance_m;
     std::vector<double> arm_clearance_m;
@@ -103,7 +103,7 @@ class Feasibility {
   Eigen::Vector3d placed(const Eigen::Vector3d& in_flange_m, const LinkFrames& frames) const;
   Finding find(const Joints& q_rad) const;
   bool find_facing(const LinkFrames& frames, Finding& finding) const;
-  bool find_touch(const Axes& axes, Finding& finding) const;
+  bool find_collision(const Axes& axes, Finding& finding) const;
   bool find_tool(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
   bool find_beam(const LinkFrames& frames, const Axes& axes, Finding& finding) const;
   void choose_pairs(const Robot& robot, const std::vector<LinkFrames>& samples);
@@ -120,7 +120,7 @@ class Feasibility {
   Eigen::Vector3d centre_;                  ///< of the tool, in F6
   Eigen::Vector3d normal_;                  ///< N in F6
   double tool_radius_m_ = 0;                ///< from the centre to the farthest reflector
-  bool stand_in_ = false;                   ///< the only reflector is the tool point
+  bool tool_point_only_ = false;            ///< the only reflector is the tool point
   std::optional<Eigen::Vector3d> tracker_m_;
   double cos_acceptance_ = 0;
   double safety_ = 3;
@@ -128,9 +128,9 @@ class Feasibility {
   std::vector<std::string> warnings_;
 };
 
-/// `count` poses that are allowed, uniform within the joint limits, rad.
-/// \throws InputError  naming the cell (or robot) file and how often each obstruction stood against a pose, where fewer
-///                     than about one random pose in a thousand is allowed
+/// Samples `count` feasible poses, uniform within the joint limits, rad.
+/// \throws InputError  naming the cell (or robot) file and the frequency of each obstruction, where fewer than
+///                     about one random pose in a thousand is feasible
 std::vector<std::array<double, joint_count>> feasible_poses(const Feasibility& feasibility,
                                                             const Robot& robot, std::size_t count,
                                                             std::uint64_t seed);

@@ -24,16 +24,18 @@ std::uint64_t scaled(double number, double effort) {
 
 using Speeds = std::array<double, joint_count>;
 
+/// Travel time, s, between joint positions at the joints' largest speeds; largest rotation, rad, where a speed
+/// is unknown.
 double distance(const Joints& a, const Joints& b, const Speeds& speed) {
-  const bool known = std::all_of(speed.begin(), speed.end(), [](double v) { return v > 0; });
+  const bool has_speeds = std::all_of(speed.begin(), speed.end(), [](double v) { return v > 0; });
   double longest = 0;
   for (std::size_t j = 0; j < joint_count; ++j) {
-    longest = std::max(longest, std::abs(a[j] - b[j]) / (known ? speed[j] : 1));
+    longest = std::max(longest, std::abs(a[j] - b[j]) / (has_speeds ? speed[j] : 1));
   }
   return longest;
 }
 
-/// Short open path; `from` is where the arm comes from, if anywhere.
+/// Short open path through a set by nearest neighbour and 2-opt. \param from  position before the first pose, if any
 PoseSet short_path(const PoseSet& set, const std::optional<Joints>& from, const Speeds& speed) {
   const std::size_t n = set.size();
   const auto step = [&](std::size_t a, std::size_t b) { return distance(set[a].q_rad, set[b].q_rad, speed); };
@@ -52,7 +54,7 @@ PoseSet short_path(const PoseSet& set, const std::optional<Joints>& from, const 
       taken[next] = 1;
       path.push_back(next);
     }
-    // 2-opt: turn a piece round wherever that is shorter.
+    // 2-opt: reverse a section wherever that is shorter.
     for (bool changed = true; changed;) {
       changed = false;
       for (std::size_t i = 0; i < n; ++i) {
@@ -123,7 +125,7 @@ std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, d
 }
 
 ExactFigures figures_of(const PlanProblem& problem, const PoseSet& set) {
-  std::vector<Block> blocks = problem.known;
+  std::vector<Block> blocks = problem.measured;
   for (Block& h : problem.blocks(set)) blocks.push_back(std::move(h));
   return exact_figures(blocks, problem.information->nuisance());
 }
@@ -137,10 +139,10 @@ std::optional<std::size_t> least_poses(const PlanProblem& problem, std::uint64_t
     for (std::size_t c = order.size(); c > 1; --c) std::swap(order[c - 1], order[below(c, random)]);
     const std::size_t most = order.empty() ? 1000 : order.size();
     PoseSet set;
-    if (!problem.known.empty() && figures_of(problem, set).full_rank) return 0;
+    if (!problem.measured.empty() && figures_of(problem, set).full_rank) return 0;
     while (set.size() < std::min(most, least.value_or(most))) {
       set.push_back(order.empty() ? problem.random_pose(random) : order[set.size()]);
-      const auto numbers = static_cast<Eigen::Index>(set.size() + problem.known.size()) * 6;
+      const auto numbers = static_cast<Eigen::Index>(set.size() + problem.measured.size()) * 6;
       if (numbers >= problem.information->unknowns() && figures_of(problem, set).full_rank) {
         least = set.size();
         break;
@@ -186,7 +188,7 @@ PoseSet rounded(const PlanProblem& problem, const PoseSet& set) {
         for (std::size_t j = 0; j < joint_count; ++j) {
           const double off = k == 0 ? 0 : 4 * (uniform(random) - 0.5);
           pose.q_rad[j] = rounded_angle(exact[j] + off * unit, decimals);
-          // A limit that has more decimals: the next value inside.
+          // A limit with more decimals: the next value inside.
           if (pose.q_rad[j] > problem.limits[j].max_rad)
             pose.q_rad[j] = rounded_angle(exact[j] - unit, decimals);
           if (pose.q_rad[j] < problem.limits[j].min_rad)
@@ -201,7 +203,7 @@ PoseSet rounded(const PlanProblem& problem, const PoseSet& set) {
   return out;
 }
 
-double way(const PoseSet& set, const Speeds& speed_rad_s) {
+double path_length(const PoseSet& set, const Speeds& speed_rad_s) {
   double sum = 0;
   for (std::size_t k = 1; k < set.size(); ++k) sum += distance(set[k - 1].q_rad, set[k].q_rad, speed_rad_s);
   return sum;

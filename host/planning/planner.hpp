@@ -24,11 +24,11 @@ std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, d
 /// True where the method moves joints freely; the others choose among candidates.
 bool moves_joints(Method method);
 
-/// The least number of poses that, with those measured already, identifies every identifiable parameter. Nothing where
-/// no number does (of the candidates, or below 1,000).
+/// Least number of poses that, with those measured already, identifies every identifiable parameter. Nothing where the
+/// candidates, or 1,000 random poses, do not.
 std::optional<std::size_t> least_poses(const PlanProblem& problem, std::uint64_t seed);
 
-/// The criteria of the measured poses and these together, without a prior.
+/// Criteria of the measured poses and these together, without a prior.
 ExactFigures figures_of(const PlanProblem& problem, const PoseSet& set);
 
 /// Fitness of `count` sets of random feasible poses, ascending.
@@ -38,14 +38,14 @@ std::vector<double> random_fitness(const PlanProblem& problem, std::size_t count
 /// rounded neighbour is feasible to 1e-6 degrees. Candidates stay as they are.
 PoseSet rounded(const PlanProblem& problem, const PoseSet& set);
 
-/// Grouped by payload, lightest first (a change of payload is what takes time), and within a group such that the slowest joint
-/// travels little: nearest neighbour from every start, then 2-opt.
+/// Orders a set for travel: by payload, lightest first, then a short path by nearest neighbour from every start
+/// and 2-opt.
 /// \param speed_rad_s  of each joint; where one is unknown (0) all have the same weight
 PoseSet in_order_of_travel(const PlanProblem& problem, const PoseSet& set,
                            const std::array<double, joint_count>& speed_rad_s);
 
-/// Travel time through a set in its order: Σ of the largest joint motion over speed.
-double way(const PoseSet& set, const std::array<double, joint_count>& speed_rad_s);
+/// Travel time through a set in its order, s: sum of the largest joint motion over speed.
+double path_length(const PoseSet& set, const std::array<double, joint_count>& speed_rad_s);
 
 }  // namespace flexcomp::host
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t reference_poses = 1000;
 
-/// Column of the frames' number i: F moves the measured pose in the measurement frame, E in Ftool (F = E = 1).
+/// Column of frame parameter i, Eq. (M32) at F = E = 1: F acts in the measurement frame, E in Ftool.
 Vector6<double> frame_column(std::size_t i, const Pose<double>& pose) {
   Vector6<double> column = Vector6<double>::Zero();
   const auto axis = static_cast<Eigen::Index>(i % 3);
@@ -81,12 +81,12 @@ PoseInformation::PoseInformation(const Robot& robot, ModelKind kind, bool frames
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * reference_poses), unknowns());
   Block h;
   for (std::size_t k = 0; k < reference_poses; ++k) {
-    PlannedMeasurement sight = like[k % like.size()];
+    PlannedMeasurement measurement = like[k % like.size()];
     for (std::size_t j = 0; j < joint_count; ++j) {
       const JointLimits& limits = robot.nominal.limits[j];
-      sight.q_rad[j] = std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random);
+      measurement.q_rad[j] = std::uniform_real_distribution<double>(limits.min_rad, limits.max_rad)(random);
     }
-    block(sight, h);
+    block(measurement, h);
     reference.middleRows(static_cast<Eigen::Index>(6 * k), h.cols()) = h.transpose();
   }
   const Elimination possible = eliminate(reference, elimination_order(all, paper.set), structural_tolerance);
@@ -124,10 +124,11 @@ void PoseInformation::block(const Joints& q_rad, const PoseContext& context, con
   if (instrument.isotropic_) {
     for (Eigen::Index r = 0; r < rows; ++r) out.col(r) = h.row(r) * instrument.whitening_(r, r);
   } else {
-    // Into Ftool first, where the template stands still.
-    const Eigen::Matrix3d turn = at.pose.rotation.transpose();
+    // Rotate into Ftool, in which the template is constant.
+    const Eigen::Matrix3d rotation = at.pose.rotation.transpose();
     Eigen::Matrix<double, 6, 6> whitening;
-    whitening << instrument.whitening_.leftCols<3>() * turn, instrument.whitening_.rightCols<3>() * turn;
+    whitening << instrument.whitening_.leftCols<3>() * rotation,
+        instrument.whitening_.rightCols<3>() * rotation;
     out.noalias() = h.transpose() * whitening.transpose();
   }
 }

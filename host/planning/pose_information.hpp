@@ -22,20 +22,20 @@ namespace flexcomp::host {
 using Joints = std::array<double, joint_count>;
 using PoseContext = Context<double, joint_count>;
 
-/// Most unknowns that a plan is made for: 39 of the model, less 6 of the base, and 12 of the frames, is 45.
+/// Limit of the unknowns of a plan: 39 of the model, less 6 of the base, plus 12 of the frames, is 45.
 constexpr int most_unknowns = 48;
 
 /// Rows of H of one pose, transposed: a row per unknown (frames first), a column per measured number (6, or 3 where only
 /// positions are measured). Whitened, and scaled by the fixed units of unit_of().
 using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most_unknowns, 6>;
 
-/// How a pose is measured, and how well.
+/// Kind and standard deviation of a measurement.
 class Instrument {
  public:
   /// Standard deviations per axis (m, rad).
   static Instrument pose(double position_sigma_m, double orientation_sigma_rad);
   static Instrument position(double sigma_m);
-  /// Each coordinate of each reflector with sigma_m; points of the template in Ftool.
+  /// Standard deviation sigma_m of each coordinate of each reflector; template points in Ftool, m. Information (M25).
   static Instrument reflectors(const std::vector<Eigen::Vector3d>& template_m, double sigma_m);
 
   Eigen::Index rows() const { return rows_; }
@@ -43,42 +43,42 @@ class Instrument {
  private:
   friend class PoseInformation;
   Eigen::Index rows_ = 6;
-  bool isotropic_ = true;  ///< position and orientation each alike in all directions
-  /// Of [position; rotation vector] in Ftool: its square is the information.
+  bool isotropic_ = true;  ///< position and orientation each isotropic
+  /// Whitening of [position; rotation vector] in Ftool, Eq. (M22).
   Eigen::Matrix<double, 6, 6> whitening_ = Eigen::Matrix<double, 6, 6>::Identity();
 };
 
-/// A pose with its measurement, made or planned.
+/// A pose with its context and instrument, measured or planned.
 struct PlannedMeasurement {
   Joints q_rad{};
   PoseContext context;
   Instrument instrument = Instrument::position(1);
 };
 
-/// The unknowns of a plan, and H at any pose. Immutable after construction, thread-safe.
+/// Unknowns of a plan, and their rows of H at any pose. Immutable after construction, thread-safe.
 class PoseInformation {
  public:
-  /// \param frames    the measurement's frames F and E will be fitted: they take the base's place and count as
-  ///                  nuisance, of any position near the nominal one
-  /// \param like      contexts and instruments that there will be; 1,000 random poses measured like these, in turn, show
-  ///                  which parameters such data identify (the others are left out, as in identify)
+  /// \param frames    the measurement frames F and E will be fitted: they replace the base and are nuisance parameters,
+  ///                  near their nominal values
+  /// \param like      contexts and instruments of the measurements; 1,000 random poses measured like these, in
+  ///                  turn, show which parameters are identifiable (M33); the others are left out, as in
+  ///                  identify
   PoseInformation(const Robot& robot, ModelKind kind, bool frames,
                   const std::vector<PlannedMeasurement>& like, std::uint64_t seed = 1);
 
   Eigen::Index unknowns() const { return nuisance() + parameters(); }
   Eigen::Index nuisance() const { return static_cast<Eigen::Index>(frames_.size()); }  ///< of F and E
-  Eigen::Index parameters() const {
-    return static_cast<Eigen::Index>(columns_.size());
-  }  ///< identifiable ones
+  /// Number of identifiable parameters.
+  Eigen::Index parameters() const { return static_cast<Eigen::Index>(columns_.size()); }
   std::size_t parameters_of_model() const { return parameters_of_model_; }
 
-  /// Names of the identifiable parameters, and what one scaled unit of each is in the unit of files.
+  /// Names of the identifiable parameters, and the size of one scaled unit of each in the unit of files.
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<double>& file_units() const { return file_units_; }
 
-  /// H of one pose. About 2 microseconds.
-  void block(const PlannedMeasurement& sight, Block& out) const {
-    block(sight.q_rad, sight.context, sight.instrument, out);
+  /// Computes the rows of H of one pose, about 2 microseconds.
+  void block(const PlannedMeasurement& measurement, Block& out) const {
+    block(measurement.q_rad, measurement.context, measurement.instrument, out);
   }
   void block(const Joints& q_rad, const PoseContext& context, const Instrument& instrument, Block& out) const;
 
@@ -89,7 +89,7 @@ class PoseInformation {
   };
   using SmallModel = Model<double, joint_count, Capacity<1, 1, 1>>;
 
-  SmallModel model_;                 ///< the nominal arm: every coefficient is zero there
+  SmallModel model_;                 ///< the nominal arm
   std::vector<std::size_t> frames_;  ///< 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E
   std::vector<double> frame_units_;
   std::vector<Column> columns_;

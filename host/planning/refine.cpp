@@ -13,10 +13,10 @@ namespace flexcomp::host {
 namespace {
 
 constexpr Eigen::Index joints = static_cast<Eigen::Index>(joint_count);
-/// Of the difference quotient of H, rad: rounding and curvature both stay below 1e-6 of the derivative.
-constexpr double probe_rad = 1e-6;
+/// Step of the difference quotient of H, rad: rounding and curvature both stay below 1e-6 of the derivative.
+constexpr double difference_rad = 1e-6;
 
-/// Log fitness of a set and its derivative for all joint angles.
+/// Log fitness of a set and its gradient over all joint positions.
 double value_and_gradient(const PlanProblem& problem, const Criterion& criterion, const PoseSet& set,
                           const std::vector<Block>& blocks, Eigen::VectorXd& gradient,
                           std::uint64_t& evaluations) {
@@ -31,17 +31,17 @@ double value_and_gradient(const PlanProblem& problem, const Criterion& criterion
     wh.noalias() = w * blocks[k];
     for (std::size_t j = 0; j < joint_count; ++j) {
       PlannedPose p = set[k];
-      p.q_rad[j] += probe_rad;
+      p.q_rad[j] += difference_rad;
       problem.block(p, moved);
       gradient[joints * static_cast<Eigen::Index>(k) + static_cast<Eigen::Index>(j)] =
-          2 * wh.cwiseProduct(moved - blocks[k]).sum() / probe_rad;
+          2 * wh.cwiseProduct(moved - blocks[k]).sum() / difference_rad;
     }
   }
   evaluations += set.size() * (joint_count + 2);
   return criterion.log_score(information.figures());
 }
 
-/// The direction of limited-memory BFGS (Nocedal and Wright, algorithm 7.4) on the joints that are free.
+/// Direction of limited-memory BFGS (Nocedal and Wright, algorithm 7.4) on the free joints.
 Eigen::VectorXd quasi_newton(const std::deque<std::pair<Eigen::VectorXd, Eigen::VectorXd>>& steps,
                              const Eigen::VectorXd& gradient, const Eigen::VectorXd& free) {
   Eigen::VectorXd d = -gradient.cwiseProduct(free);
@@ -62,6 +62,45 @@ Eigen::VectorXd quasi_newton(const std::deque<std::pair<Eigen::VectorXd, Eigen::
   return d.cwiseProduct(free);
 }
 
+/// 1 for joints that may move, 0 for those at a limit against which the gradient pushes.
+Eigen::VectorXd free_joints(const PlanProblem& problem, const PoseSet& set, const Eigen::VectorXd& gradient) {
+  Eigen::VectorXd free = Eigen::VectorXd::Ones(gradient.size());
+  for (Eigen::Index i = 0; i < free.size(); ++i) {
+    const double q = set[static_cast<std::size_t>(i / joints)].q_rad[static_cast<std::size_t>(i % joints)];
+    const JointLimits& limits = problem.limits[static_cast<std::size_t>(i % joints)];
+    if ((q <= limits.min_rad && gradient[i] > 0) || (q >= limits.max_rad && gradient[i] < 0)) free[i] = 0;
+  }
+  return free;
+}
+
+/// Moves a set by t * direction inside the limits and returns the slope: gradient times motion. A pose whose
+/// step is not feasible takes a shorter one, or stays.
+double step_along(const PlanProblem& problem, const PoseSet& set, const Eigen::VectorXd& direction,
+                  const Eigen::VectorXd& gradient, double t, PoseSet& moved) {
+  moved = set;
+  double slope = 0;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    const Eigen::Index first = joints * static_cast<Eigen::Index>(k);
+    double own = t;
+    for (int shorter = 0;; ++shorter, own /= 4) {
+      for (std::size_t j = 0; j < joint_count; ++j) {
+        moved[k].q_rad[j] =
+            std::clamp(set[k].q_rad[j] + own * direction[first + static_cast<Eigen::Index>(j)],
+                       problem.limits[j].min_rad, problem.limits[j].max_rad);
+      }
+      if (!problem.feasible || problem.feasible(moved[k].q_rad)) break;
+      if (shorter == 3) {
+        moved[k] = set[k];
+        break;
+      }
+    }
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      slope += gradient[first + static_cast<Eigen::Index>(j)] * (moved[k].q_rad[j] - set[k].q_rad[j]);
+    }
+  }
+  return slope;
+}
+
 }  // namespace
 
 double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double tolerance,
@@ -76,12 +115,7 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
   std::deque<std::pair<Eigen::VectorXd, Eigen::VectorXd>> steps;
   int small = 0;
   for (int iteration = 0; iteration < most_steps; ++iteration) {
-    Eigen::VectorXd free = Eigen::VectorXd::Ones(joints * n);
-    for (Eigen::Index i = 0; i < free.size(); ++i) {
-      const double q = set[static_cast<std::size_t>(i / joints)].q_rad[static_cast<std::size_t>(i % joints)];
-      const JointLimits& limits = problem.limits[static_cast<std::size_t>(i % joints)];
-      if ((q <= limits.min_rad && gradient[i] > 0) || (q >= limits.max_rad && gradient[i] < 0)) free[i] = 0;
-    }
+    const Eigen::VectorXd free = free_joints(problem, set, gradient);
     Eigen::VectorXd direction = quasi_newton(steps, gradient, free);
     if (!(direction.dot(gradient) < 0)) {
       steps.clear();
@@ -96,29 +130,8 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
     std::vector<Block> trial_blocks(set.size());
     bool accepted = false;
     for (int halving = 0; halving < 12 && !accepted; ++halving, t /= 2) {
-      trial = set;
-      double slope = 0;
-      for (std::size_t k = 0; k < set.size(); ++k) {
-        const Eigen::Index first = joints * static_cast<Eigen::Index>(k);
-        // A pose that meets an obstacle goes less far, or not at all; the others need not wait for it.
-        double own = t;
-        for (int shorter = 0;; ++shorter, own /= 4) {
-          for (std::size_t j = 0; j < joint_count; ++j) {
-            trial[k].q_rad[j] =
-                std::clamp(set[k].q_rad[j] + own * direction[first + static_cast<Eigen::Index>(j)],
-                           problem.limits[j].min_rad, problem.limits[j].max_rad);
-          }
-          if (!problem.feasible || problem.feasible(trial[k].q_rad)) break;
-          if (shorter == 3) {
-            trial[k] = set[k];
-            break;
-          }
-        }
-        for (std::size_t j = 0; j < joint_count; ++j) {
-          slope += gradient[first + static_cast<Eigen::Index>(j)] * (trial[k].q_rad[j] - set[k].q_rad[j]);
-        }
-        problem.block(trial[k], trial_blocks[k]);
-      }
+      const double slope = step_along(problem, set, direction, gradient, t, trial);
+      for (std::size_t k = 0; k < set.size(); ++k) problem.block(trial[k], trial_blocks[k]);
       evaluations += set.size();
       accepted = slope < 0 && criterion.log_score(problem.of(trial_blocks).figures()) <= value + 1e-4 * slope;
     }
@@ -152,17 +165,17 @@ double descend(const PlanProblem& problem, PoseSet& set, int most_steps, double 
 void RefineSearch::step() {
   if (done()) return;
   std::mt19937_64 random = random_of(options_.seed, next_++);
-  if (now_.empty()) {
+  if (current_.empty()) {
     const CandidatePool pool = make_pool(problem_, options_.candidates, random);
     std::vector<std::size_t> chosen = random_choice(pool, problem_.poses, random);
     exchange(problem_, pool, problem_.criterion(), chosen, evaluations_, 4);
-    now_ = poses_of(pool, chosen);
-    now_log_ = descend(problem_, now_, 100, 1e-4, evaluations_);
-    offer(now_, now_log_);
+    current_ = poses_of(pool, chosen);
+    current_log_ = descend(problem_, current_, 100, 1e-4, evaluations_);
+    offer(current_, current_log_);
     return;
   }
-  // One pose gives way to the best of some others, and the set settles anew.
-  PoseSet trial = now_;
+  // Replace one pose by the best of some random ones, then descend again.
+  PoseSet trial = current_;
   const std::size_t k = below(trial.size(), random);
   const Criterion criterion = problem_.criterion();
   Information rest = problem_.of(problem_.blocks(trial));
@@ -178,24 +191,24 @@ void RefineSearch::step() {
   }
   evaluations_ += options_.replacements;
   const double value = descend(problem_, trial, 30, 1e-4, evaluations_);
-  if (value < now_log_) {
-    now_ = trial;
-    now_log_ = value;
-    offer(now_, now_log_);
+  if (value < current_log_) {
+    current_ = trial;
+    current_log_ = value;
+    offer(current_, current_log_);
   }
 }
 
 void RefineSearch::save_own(nlohmann::json& state) const {
   state["step"] = next_;
-  state["now"] = to_json(now_);
-  state["now_log"] = now_log_;
+  state["now"] = to_json(current_);
+  state["now_log"] = current_log_;
 }
 
 void RefineSearch::load_own(const nlohmann::json& state) {
   next_ = state.at("step").get<std::uint64_t>();
-  now_.clear();
-  if (!state.at("now").empty()) now_ = pose_set_of(state.at("now"), problem_);
-  now_log_ = state.at("now_log").get<double>();
+  current_.clear();
+  if (!state.at("now").empty()) current_ = pose_set_of(state.at("now"), problem_);
+  current_log_ = state.at("now_log").get<double>();
 }
 
 }  // namespace flexcomp::host

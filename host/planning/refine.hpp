@@ -23,7 +23,7 @@ struct RefineOptions {
   std::uint64_t seed = 1;
 };
 
-/// Iterated local search; each step is one start or one replacement with what follows.
+/// Iterated local search; each step is one start, or one replacement and the descent after it.
 class RefineSearch : public Search {
  public:
   RefineSearch(const PlanProblem& problem, const RefineOptions& options)
@@ -40,8 +40,8 @@ class RefineSearch : public Search {
  private:
   RefineOptions options_;
   std::uint64_t next_ = 0;
-  PoseSet now_;
-  double now_log_ = 0;
+  PoseSet current_;
+  double current_log_ = 0;
 };
 
 }  // namespace flexcomp::host

@@ -19,7 +19,8 @@ void SapsoSearch::evaluate(Particle& particle) {
   evaluations_ += particle.at.size();
 }
 
-/// One motion. A joint that meets its limit stops there; a pose that is not allowed stays where it was, at rest.
+/// Moves a particle by its velocity. A joint stops at its limit; a pose that would be infeasible stays, with
+/// velocity 0.
 void SapsoSearch::move(Particle& particle, double inertia, const PoseSet& lead,
                        std::mt19937_64& random) const {
   for (std::size_t k = 0; k < particle.at.size(); ++k) {
@@ -38,7 +39,7 @@ void SapsoSearch::move(Particle& particle, double inertia, const PoseSet& lead,
       next.q_rad[j] = std::clamp(q + speed[j], limits.min_rad, limits.max_rad);
       speed[j] = next.q_rad[j] - q;
     }
-    // A payload is no number to be moved by a bit: it is taken over from the bests, or drawn.
+    // The payload index is discrete: copied from one of the bests, or random.
     if (problem_.payloads.size() > 1) {
       const double choice = uniform(random);
       if (choice < 0.1)

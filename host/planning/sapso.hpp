@@ -12,22 +12,22 @@
 
 namespace flexcomp::host {
 
-/// Inertia of a particle with objective f: small for the good ones, so that they settle. Eq. 35 prints
-/// w_min - (w_max - w_min)(f - f_min)/(f_avg - f_min), which leaves [w_min, w_max]; the sign is a plus.
+/// Inertia of a particle with objective f, Eq. (M47): least for the best, which then converge. Chen 35 prints
+/// w_min - (w_max - w_min)(f - f_min)/(f_avg - f_min), which leaves [w_min, w_max]; here the sign is a plus.
 double adaptive_inertia(double f, double f_min, double f_avg, double w_min, double w_max);
 
 struct SapsoOptions {
   std::size_t particles = 500;
   std::uint64_t iterations = 600;
-  double own = 2;    ///< c1, pull to the particle's own best
-  double swarm = 2;  ///< c2, pull to the swarm's best
+  double own = 2;    ///< c1, weight of the particle's own best
+  double swarm = 2;  ///< c2, weight of the swarm's best
   double least_inertia = 0.5;
   double largest_inertia = 0.8;
   /// Largest step of a joint in one iteration, as a share of its range: c1 = c2 = 2 does not converge by itself.
   double largest_speed = 0.05;
   std::uint64_t seed = 1;
-  /// Objective; empty: the dual index with Omin in expectation. The oracle form of the paper (Eq. 30, with the
-  /// true parameters) is given by the studies, which know them. best_log_fitness() is then the logarithm of this.
+  /// Objective; empty: the dual index with Omin in expectation. The studies set the form of Chen 30, with the true
+  /// parameters. best_log_fitness() is then the logarithm of this objective.
   std::function<double(const PoseSet&)> objective;
 };
 

@@ -8,13 +8,13 @@ namespace flexcomp::host {
 
 namespace {
 
-/// 10,000 units (1 m, 500 degrees): nothing, but an inverse exists.
+/// Precision of a standard deviation of 10,000 units (1 m, 500 degrees): negligible, but M is invertible.
 constexpr double weak_prior = 1e-8;
 
 }  // namespace
 
 Criterion PlanProblem::criterion(Goal goal) const {
-  return {information->parameters(), static_cast<double>(poses + known.size()), goal};
+  return {information->parameters(), static_cast<double>(poses + measured.size()), goal};
 }
 
 void PlanProblem::block(const PlannedPose& pose, Block& out) const {
@@ -40,15 +40,15 @@ bool PlanProblem::allows(const Joints& q_rad) const {
   return !feasible || feasible(q_rad);
 }
 
-void PlanProblem::take_as_known(std::vector<Block> blocks) {
-  known = std::move(blocks);
-  known_sum = sum_of_squares(known, information->unknowns());
+void PlanProblem::set_measured(std::vector<Block> blocks) {
+  measured = std::move(blocks);
+  measured_sum = sum_of_squares(measured, information->unknowns());
 }
 
 Information PlanProblem::of(const std::vector<Block>& blocks) const {
   Information out(information->nuisance(), information->parameters(), weak_prior);
   Eigen::MatrixXd m = sum_of_squares(blocks, information->unknowns());
-  if (!known.empty()) m += known_sum;
+  if (!measured.empty()) m += measured_sum;
   out.assign(m);
   return out;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// \file
-/// The planning problem, and the interface of all search methods: small steps with progress, state that is saved and
-/// restored.
+/// \file The planning problem, and the interface of all search methods: steps with progress, state that is
+/// saved and restored.
 #ifndef FLEXCOMP_HOST_PLANNING_SEARCH_HPP
 #define FLEXCOMP_HOST_PLANNING_SEARCH_HPP
 
@@ -32,32 +31,33 @@ struct PlanProblem {
   Instrument instrument = Instrument::position(1);
   std::vector<PoseContext> payloads;  ///< contexts that differ in their payload; one or more
   std::array<JointLimits, joint_count> limits{};
-  std::function<bool(const Joints&)> feasible;  ///< beyond the limits; empty: everything is
+  std::function<bool(const Joints&)> feasible;  ///< beyond the limits; empty: all poses are
   PoseSet candidates;                           ///< only these, each once; empty: anything within the limits
   std::size_t poses = 0;                        ///< how many to choose
-  std::vector<Block> known;                     ///< what has been measured already, see take_as_known()
-  Eigen::MatrixXd known_sum;
+  std::vector<Block> measured;                  ///< of poses measured already, see set_measured()
+  Eigen::MatrixXd measured_sum;                 ///< Σ HHᵀ of them
 
   Criterion criterion(Goal goal = Goal::dual) const;
   void block(const PlannedPose& pose, Block& out) const;
   Block block(const PlannedPose& pose) const;
   std::vector<Block> blocks(const PoseSet& set) const;
   bool allows(const Joints& q_rad) const;  ///< within the limits and feasible
-  void take_as_known(std::vector<Block> blocks);
-  /// The information of the measured poses and these blocks; with a weak prior (10,000 units), so that sets of too few
-  /// poses are comparable.
+  void set_measured(std::vector<Block> blocks);
+  /// Information matrix of the measured poses and these blocks, with a weak prior (10,000 units) that makes
+  /// sets of too few poses comparable.
   Information of(const std::vector<Block>& blocks) const;
   double log_fitness(const PoseSet& set) const;
 
-  /// A feasible pose, uniform within the limits, with a random payload; a random candidate where there are candidates.
-  /// \throws std::runtime_error  after a million refusals in a row
+  /// Random feasible pose, uniform within the limits, with a random payload; or a random candidate.
+  /// \throws std::runtime_error  after a million infeasible poses
   PlannedPose random_pose(std::mt19937_64& random) const;
 };
 
-/// Uniform in [0, 1), and an index below `count`.
+/// Uniform random number in [0, 1).
 double uniform(std::mt19937_64& random);
+/// Uniform random index below `count`.
 std::size_t below(std::size_t count, std::mt19937_64& random);
-/// Independent random numbers for step `index` of a search with this seed: steps can be repeated one by one.
+/// Random engine of step `index` of a search with this seed: each step can be repeated by itself.
 std::mt19937_64 random_of(std::uint64_t seed, std::uint64_t index);
 
 /// A search method applied to one problem.
@@ -73,15 +73,13 @@ class Search {
   virtual double progress() const = 0;  ///< share of the work that is done, 0 … 1
   bool done() const { return progress() >= 1; }
 
-  const PoseSet& best() const { return best_; }  ///< empty before the first step
-  double best_log_fitness() const {
-    return best_log_;
-  }  ///< of the dual index, whatever the method's objective
+  const PoseSet& best() const { return best_; }               ///< empty before the first step
+  double best_log_fitness() const { return best_log_; }       ///< of the dual index, for every method
   std::uint64_t evaluations() const { return evaluations_; }  ///< poses whose H or gain was computed
   /// Evaluations and log fitness at each improvement.
   const std::vector<std::pair<std::uint64_t, double>>& history() const { return history_; }
 
-  /// The complete state: a search that restores it continues exactly as if it had not been interrupted.
+  /// Complete state: a search that loads it continues exactly as if it had not been interrupted.
   nlohmann::json save() const;
   /// \throws nlohmann::json::exception, std::runtime_error  where the state does not fit
   void load(const nlohmann::json& state);
@@ -89,9 +87,9 @@ class Search {
  protected:
   virtual void save_own(nlohmann::json& state) const = 0;
   virtual void load_own(const nlohmann::json& state) = 0;
-  /// Takes a set as the best where it is better.
+  /// Replaces the best set where this one is better.
   bool offer(const PoseSet& set, double log_fitness);
-  /// Takes a set as the best in any case: for a method with another objective.
+  /// Replaces the best set: for a method with another objective.
   void replace_best(const PoseSet& set, double log_fitness);
 
   const PlanProblem& problem_;
@@ -103,8 +101,9 @@ class Search {
   std::vector<std::pair<std::uint64_t, double>> history_;
 };
 
+/// Joint positions, rad, and payload index of each pose.
 nlohmann::json to_json(const PoseSet& set);
-/// \throws nlohmann::json::exception, std::runtime_error  where it is no set of this problem
+/// Inverse of to_json(). \throws nlohmann::json::exception, std::runtime_error  where it is no set of this problem
 PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem);
 
 }  // namespace flexcomp::host

@@ -16,10 +16,9 @@ double squared_distance(const Eigen::Vector3d& point, const Segment& segment) {
 }
 
 double squared_distance(const Segment& a, const Segment& b) {
-  // The nearest points lie inside both segments (then on the common perpendicular of the two lines), or one of them is an
-  // end. Between nearly parallel lines the perpendicular's place is uncertain, by as little as it then matters; the ends
-  // are asked besides, so that no case needs a threshold. Cross products, because uu * vv - uv * uv would lose twice as
-  // many digits.
+  // The nearest points lie inside both segments, on the common perpendicular of their lines, or one of them is
+  // an end. For nearly parallel lines the perpendicular is ill-conditioned, but the ends are compared as well,
+  // so no case needs a threshold. Cross products, because uu * vv - uv * uv would lose twice as many digits.
   const Eigen::Vector3d u = a.to - a.from;
   const Eigen::Vector3d v = b.to - b.from;
   const Eigen::Vector3d w = b.from - a.from;

@@ -8,7 +8,7 @@
 
 namespace flexcomp::host {
 
-/// All points from `from` to `to`; one point where they are equal.
+/// Line segment, m; a point where both ends are equal.
 struct Segment {
   Eigen::Vector3d from;
   Eigen::Vector3d to;
@@ -17,7 +17,7 @@ struct Segment {
 /// Squared distance of a point from a segment, m².
 double squared_distance(const Eigen::Vector3d& point, const Segment& segment);
 
-/// Squared distance of two segments, m²; of any length and direction, also crossing, parallel and of no length.
+/// Squared distance of two segments, m²; exact also for crossing, parallel and degenerate ones.
 double squared_distance(const Segment& a, const Segment& b);
 
 }  // namespace flexcomp::host

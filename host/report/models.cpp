@@ -16,11 +16,11 @@ constexpr double least_left = 1e-6;
 /// Residuals of rows that the fit did not see.
 std::optional<std::vector<RowResidual>> left_out(const Identification& r, const HostModel& model,
                                                  const std::vector<Observation>& rows) {
-  Unknowns free = r.known.fitted;
+  Unknowns free = r.identifiability.fitted;
   // A parameter at its bound stays there whichever row is missing.
   free.parameters.clear();
-  for (std::size_t p = 0; p < r.known.fitted.parameters.size(); ++p) {
-    if (!r.fit.at_bound[p]) free.parameters.push_back(r.known.fitted.parameters[p]);
+  for (std::size_t p = 0; p < r.identifiability.fitted.parameters.size(); ++p) {
+    if (!r.fit.at_bound[p]) free.parameters.push_back(r.identifiability.fitted.parameters[p]);
   }
   const Linearised lin = linearised(r.fit.estimate, model, rows, free);
   Eigen::MatrixXd weighted = lin.derivative;
@@ -72,7 +72,7 @@ std::vector<ModelFit> compare_models(const Robot& robot, const std::vector<Obser
     m.kind = kind;
     try {
       const Identification r = identify(robot, rows, source, plain);
-      if (r.known.fitted.count() == 0 || !r.fit.converged) continue;
+      if (r.identifiability.fitted.count() == 0 || !r.fit.converged) continue;
       const auto model = prepare(r.fit.estimate.set, robot, source);
       m.parameters = r.identifiable;
       m.fitted = r.after;

@@ -10,7 +10,7 @@
 
 namespace flexcomp::host {
 
-/// Appends the parameters and the fitted numbers of the frames with their uncertainty, and what could not be told apart.
+/// Appends the parameters and the fitted frame parameters with their uncertainty, and what could not be told apart.
 void add_parameters(Page& page, const Calibration& calibration, const Robot& robot);
 
 }  // namespace flexcomp::host

@@ -187,8 +187,8 @@ Page page_of(const Identification& r, const std::vector<Observation>& rows, cons
   p.poses.push_back(set);
   if (!compared.empty()) p.further.push_back(models_section(compared, without_priors));
   add_parameters(p, r.calibration, robot);
-  p.missing = r.known.missing;
-  for (const SuggestedPose& c : r.known.cure) p.cure_rad.push_back(c.q_rad);
+  p.missing = r.identifiability.missing;
+  for (const SuggestedPose& c : r.identifiability.suggested_poses) p.cure_rad.push_back(c.q_rad);
   return p;
 }
 

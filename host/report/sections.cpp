@@ -141,7 +141,7 @@ std::string identifiability_sections(const Page& page) {
       "Missing in these data",
       fmt::format("<p>Other poses of the same kind would know them: {}.</p>\n", code_list(page.missing)));
   if (!page.cure_rad.empty())
-    out += free_section(poses_table("Poses that would cure it, best first", page.cure_rad, {}, 1));
+    out += free_section(poses_table("Poses that would identify them, best first", page.cure_rad, {}, 1));
   return out;
 }
 

@@ -30,7 +30,7 @@ Eigen::Vector3d normal_vector(std::normal_distribution<double>& normal, std::mt1
   return {x, y, sigma * normal(random)};
 }
 
-/// E max(0, 1 - |z| s) of a standard normal z.
+/// Expectation of max(0, 1 - |z| s) for a standard normal z.
 double expected_score(double relative_sigma) {
   if (!(relative_sigma > 0)) return 1;
   const double limit = 1 / relative_sigma;
@@ -38,8 +38,8 @@ double expected_score(double relative_sigma) {
   return std::erf(limit / std::sqrt(2.0)) - 2 * relative_sigma * density_gap;
 }
 
-/// The smallest of all solutions that are best.
-Eigen::VectorXd smallest_solution(const Linearised& lin) {
+/// Minimum-norm least squares solution.
+Eigen::VectorXd minimum_norm_solution(const Linearised& lin) {
   return shortest_least_squares(lin.derivative, lin.residual);
 }
 
@@ -76,10 +76,11 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
   all.parameters = paper.parameters;
   all.prior =
       prior_knowledge(paper.set, all.parameters, options.method == Estimation::ours, options.tolerances);
-  const Identifiability known = analyse_identifiability(arm.robot, clean_, start_, all, structure_seed);
-  missing_ = known.missing;
-  unknowns_ = known.fitted;
-  if (options.insist) {
+  const Identifiability identifiability =
+      analyse_identifiability(arm.robot, clean_, start_, all, structure_seed);
+  missing_ = identifiability.missing;
+  unknowns_ = identifiability.fitted;
+  if (options.fit_all) {
     const Elimination possible = possible_columns(arm.robot, clean_, start_, all, structure_seed);
     unknowns_ = Unknowns();
     for (const std::size_t c : possible.kept) {
@@ -88,7 +89,7 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
     }
   }
 
-  // What the fitted parameters mean: the complete model, fitted without noise where everything is known.
+  // True values of the fitted parameters: noise-free fit of the complete model at poses that identify it.
   Unknowns complete;
   ParametricModel full = paper_model(arm.robot.nominal, ModelKind::full, true);
   Estimate nominal;
@@ -115,8 +116,8 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
 }
 
 Estimate Experiment::calibrate(std::uint64_t seed) const {
-  std::seed_seq words{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
-  std::mt19937_64 random(words);
+  std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
+  std::mt19937_64 random(sequence);
   std::normal_distribution<double> normal;
   std::vector<Observation> rows = clean_;
   for (Observation& row : rows) {
@@ -141,7 +142,7 @@ Estimate Experiment::from(const std::vector<Observation>& measured) const {
   }
   const auto model = prepare(start_.set, arm_.robot, arm_.name);
   Estimate estimate = start_;
-  move(estimate, unknowns_, smallest_solution(linearised(start_, *model, rows, unknowns_)));
+  move(estimate, unknowns_, minimum_norm_solution(linearised(start_, *model, rows, unknowns_)));
   return estimate;
 }
 
@@ -158,7 +159,7 @@ Eigen::VectorXd Experiment::scores(const Estimate& estimate) const {
 
 Eigen::MatrixXd Experiment::cramer_rao() const {
   const auto model = prepare(at_truth_.set, arm_.robot, arm_.name);
-  // The terms of at_truth_ are those of the full model; unknowns_ indexes the fitted one. Same parameters by name.
+  // at_truth_ has the terms of the full model, unknowns_ indexes those of the fitted one: match by name.
   Unknowns there;
   const ParametricModel full = paper_model(arm_.robot.nominal, ModelKind::full, true);
   for (const Parameter& p : unknowns_.parameters) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Calibrations repeated with fresh noise: what a study counts.
+/// Repeated calibrations of a simulated arm with random noise, their scores and Cramér-Rao limits.
 #ifndef FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
 #define FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
 
@@ -20,12 +20,12 @@
 
 namespace flexcomp::host {
 
-/// How parameters come from residuals.
+/// Estimator.
 enum class Estimation {
-  m_lm,  ///< modified Levenberg-Marquardt (Eq. 36, 37), whitened, every row in full, no bounds: the paper's
+  m_lm,  ///< the paper's modified Levenberg-Marquardt (Chen 36, 37), whitened, without weights and bounds
   ours,  ///< the default of `identify`: bounded compliances, robust loss
-  least_squares,  ///< one linear solution with H of the nominal arm (Eq. 24), whitened
-  unweighted,     ///< the same on millimetres and radians as they are
+  least_squares,  ///< one linear solution with H of the nominal arm (Chen 24), whitened
+  unweighted,     ///< the same in mm and rad, unweighted
 };
 
 struct ExperimentOptions {
@@ -34,37 +34,37 @@ struct ExperimentOptions {
   Estimation method = Estimation::m_lm;
   NoiseLevel noise = noise_n1;
   std::vector<Tolerance> tolerances;
-  /// Fit what random poses of this kind would know even where these poses know it badly or not at all (where nothing
-  /// is known, least squares give the smallest solution). false: what is_knowable says.
-  bool insist = false;
+  /// True: fit all parameters that random poses of this kind identify, also those that these poses do not
+  /// (least squares then give the minimum-norm solution). False: those that analyse_identifiability() selects.
+  bool fit_all = false;
 };
 
-/// Poses of an assumed true arm and the model that is fitted there. Poses, truth and model stay; noise is drawn.
+/// Simulated experiment: an assumed true arm, poses, and the fitted model. Each calibration draws its own noise.
 class Experiment {
  public:
   Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& poses, const ExperimentOptions& options);
 
   std::size_t fitted() const { return unknowns_.parameters.size(); }
   const std::vector<Parameter>& parameters() const { return unknowns_.parameters; }
-  /// Parameters that random poses of the kind would know and these do not.
+  /// Parameters that random poses of the kind identify, but these poses do not.
   const std::vector<std::string>& missing() const { return missing_; }
 
-  /// True values of the fitted parameters in SI, with what they are lumped with (d1 + base z): the errors of the model
-  /// that is complete and fitted without noise at many poses.
+  /// True values of the fitted parameters, SI, including confounded ones (d1 + base z): from a noise-free fit of the
+  /// complete model at many poses.
   const Eigen::VectorXd& truth() const { return truth_; }
 
-  /// The same rows with noise of its own for each seed, and what is made of them.
+  /// Estimate from the rows with random noise of this seed.
   Estimate calibrate(std::uint64_t seed) const;
   Estimate calibrate_without_noise() const { return from(clean_); }
   Eigen::VectorXd values(const Estimate& estimate) const;  ///< of the fitted parameters, SI
 
-  /// max(0, 1 - |estimate - true| / |true|) of each fitted parameter (docs/model.md, M50).
+  /// Score max(0, 1 - |estimate - true| / |true|) of each fitted parameter, Eq. (M50).
   Eigen::VectorXd scores(const Estimate& estimate) const;
 
-  /// The mean score of estimates that are normal around the truth with the smallest covariance that unbiased ones can
-  /// have (Cramér, Rao); 0 where the poses do not know every parameter.
+  /// Expected mean score of estimates that are normal around the truth with the Cramér-Rao covariance; 0 where
+  /// the poses do not identify every parameter.
   double cramer_rao_score() const;
-  /// That covariance, in SI; at the truth.
+  /// Cramér-Rao covariance (inverse information matrix) at the truth, SI.
   Eigen::MatrixXd cramer_rao() const;
 
   const Estimate& at_truth() const { return at_truth_; }
@@ -83,14 +83,14 @@ class Experiment {
   std::vector<std::string> missing_;
 };
 
-/// Rows as an instrument without noise would see them; weights are those of the noise level.
+/// Noise-free rows of an arm; the whitening is that of the noise level.
 std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                                     bool orientations, const NoiseLevel& noise);
 
-/// Does work(k) for k = 0 … count - 1 on all cores; whatever they are, the same results.
+/// Runs work(k) for k = 0 … count - 1 on all cores; the results do not depend on their number.
 void for_each_repeat(std::size_t count, const std::function<void(std::size_t)>& work);
 
-/// Mean and spread of the score over repeats.
+/// Mean and standard deviation of the score over repeats.
 struct Score {
   double mean = 0;
   double sigma = 0;  ///< standard deviation of one repeat
@@ -98,10 +98,11 @@ struct Score {
   Eigen::VectorXd of_parameter;  ///< mean per fitted parameter
 
   double error_of_mean() const;
-  /// Repeats after which the mean is within 1 % of itself with a probability of 95 %.
+  /// Repeats after which the 95 % interval of the mean is ±1 % of it.
   double repeats_for_one_percent() const;
 };
 
+/// Scores of `repeats` calibrations with independent noise.
 Score repeated_score(const Experiment& experiment, std::size_t repeats, std::uint64_t seed);
 
 }  // namespace flexcomp::host

@@ -68,8 +68,8 @@ Study study_fig3(const StudyOptions& options) {
     study.notes.push_back(arm.about);
   }
   study.notes.push_back(
-      "What a model leaves out is taken up by geometric parameters, and they come out wrong: rigid and "
-      "flexible errors "
+      "Geometric parameters absorb the errors that a model omits and are then wrong: rigid and flexible "
+      "errors "
       "must be identified together. The paper prints \"nearly 100 %\" for 36 parameters and draws the "
       "others.");
   return study;

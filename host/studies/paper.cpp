@@ -18,7 +18,7 @@ namespace flexcomp::host {
 
 namespace {
 
-// Table 1. Links 1 to 6; a place that a link does not have is skipped.
+// Chen, Table 1. Links 1 to 6; places that a link does not have are skipped.
 constexpr std::array<double, 6> theta_deg{-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};
 constexpr std::array<double, 6> d_mm{-0.4, 0, 0.2, -0.1, 0.1, -0.3};
 constexpr std::array<double, 6> a_mm{0.09, -0.05, -0.1, 0.06, -0.08, 0.03};
@@ -91,7 +91,7 @@ StudiedArm scaled_to(const StudiedArm& arm, double mean_error_m, const std::vect
     }
     return scaled;
   };
-  // The error is nearly proportional to the factor: secant steps settle at once.
+  // The error is nearly proportional to the factor: the iteration converges in a few steps.
   double factor = 1;
   for (int k = 0; k < 20; ++k) factor *= mean_error_m / mean_error_before_m(with(factor), poses);
   StudiedArm scaled = with(factor);

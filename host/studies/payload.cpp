@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the payload is good for: the paper says that the gain of the flexible model grows with it.
+// Gain of the flexible model over the payload: the paper says that it grows.
 #include <fmt/format.h>
 
 #include "flexcomp/forward.hpp"
@@ -12,19 +12,19 @@ namespace flexcomp::host {
 namespace {
 
 /// Mean true position error on other poses over repeated calibrations, m.
-double mean_left_m(const StudiedArm& arm, const Experiment& experiment,
-                   const std::vector<Observation>& others, const StudyOptions& options) {
-  std::vector<double> left(options.repeats);
+double mean_residual_m(const StudiedArm& arm, const Experiment& experiment,
+                       const std::vector<Observation>& others, const StudyOptions& options) {
+  std::vector<double> residual(options.repeats);
   for_each_repeat(options.repeats, [&](std::size_t k) {
     const auto model = prepare(experiment.calibrate((options.seed << 32) + k).set, arm.robot, arm.name);
     Workspace<double, joint_count> ws;
     for (const Observation& row : others) {
-      left[k] += (row.p_m - forward(*model, row.q_rad, row.context, ws).position).norm() /
-                 static_cast<double>(others.size());
+      residual[k] += (row.p_m - forward(*model, row.q_rad, row.context, ws).position).norm() /
+                     static_cast<double>(others.size());
     }
   });
   double sum = 0;
-  for (const double v : left) sum += v / static_cast<double>(options.repeats);
+  for (const double v : residual) sum += v / static_cast<double>(options.repeats);
   return sum;
 }
 
@@ -33,7 +33,7 @@ double mean_left_m(const StudiedArm& arm, const Experiment& experiment,
 Study study_payload(const StudyOptions& options) {
   Study study;
   study.name = "payload";
-  study.title = "What the payload is good for";
+  study.title = "Gain of the flexible model over the payload";
   study.quantity = "mean score of the parameters (1 is perfect)";
   study.label_names = {"arm", "noise", "payload [kg]", "rigid-flexible [mm]", "geometric [mm]", "gain"};
   for (const StudiedArm& given : options.arms) {
@@ -47,7 +47,7 @@ Study study_payload(const StudyOptions& options) {
       Curve rigid{fmt::format("{} geometric", noise.name), {}};
       double done = 0;
       for (const double payload : {0.5, 1.1, 3.0, 5.0}) {
-        options.say(fmt::format("{} {}: {} kg", given.name, noise.name, payload), done++ / 4);
+        options.report(fmt::format("{} {}: {} kg", given.name, noise.name, payload), done++ / 4);
         StudiedArm arm = given;
         arm.robot.nominal.payload_kg = payload;
         const std::vector<StudiedPose> poses = planned_poses(arm, 14, Planning::ours, options.seed);
@@ -56,13 +56,13 @@ Study study_payload(const StudyOptions& options) {
         ExperimentOptions how;
         how.method = Estimation::ours;
         how.noise = noise;
-        how.insist = true;
+        how.fit_all = true;
         const Experiment full(arm, poses, how);
         how.model = ModelKind::geometric;
         const Experiment geometric(arm, poses, how);
         const Score score = repeated_score(full, options.repeats, options.seed);
-        const double full_mm = mean_left_m(arm, full, others, options) * 1e3;
-        const double geometric_mm = mean_left_m(arm, geometric, others, options) * 1e3;
+        const double full_mm = mean_residual_m(arm, full, others, options) * 1e3;
+        const double geometric_mm = mean_residual_m(arm, geometric, others, options) * 1e3;
         StudyRow row;
         row.labels = {arm.name,
                       noise.name,
@@ -85,10 +85,9 @@ Study study_payload(const StudyOptions& options) {
   }
   study.notes.push_back(
       "14 planned poses for each payload. mm: mean true position error on 100 other poses with the same "
-      "payload; gain: how "
-      "many times smaller it is with the flexible model than with the geometric one. The paper says that the "
-      "gain grows "
-      "with the payload, and prints no figures.");
+      "payload; gain: error of the geometric model over that of the flexible one. The paper says that the "
+      "gain "
+      "grows with the payload, and prints no figures.");
   return study;
 }
 

@@ -16,8 +16,8 @@ namespace flexcomp::host {
 
 namespace {
 
-/// Eq. 33 with Eq. 30 as the paper can only have meant it in a simulation: squared errors of the least squares estimate
-/// against the truth, in units, for one draw of noise that stays the same for all sets.
+/// Objective of Chen 33 with Chen 30 in its only possible reading for a simulation: squared errors of the least squares
+/// estimate against the truth, in units, for one draw of noise, the same for all sets.
 class OracleObjective {
  public:
   OracleObjective(const PlanProblem& problem, std::uint64_t seed) : problem_(problem) {

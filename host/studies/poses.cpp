@@ -18,8 +18,8 @@ Study study_poses(const StudyOptions& options) {
   for (const StudiedArm& arm : options.arms) {
     std::vector<std::vector<StudiedPose>> planned;
     for (const std::size_t n : counts) {
-      options.say(fmt::format("{}: planning {} poses", arm.name, n),
-                  static_cast<double>(planned.size()) / static_cast<double>(counts.size()));
+      options.report(fmt::format("{}: planning {} poses", arm.name, n),
+                     static_cast<double>(planned.size()) / static_cast<double>(counts.size()));
       planned.push_back(planned_poses(arm, n, Planning::ours, options.seed));
     }
     Curves curves;
@@ -28,7 +28,7 @@ Study study_poses(const StudyOptions& options) {
     curves.y_name = "score";
     for (const NoiseLevel& noise : options.noises) {
       Curve ours{fmt::format("{} planned", noise.name), {}};
-      std::size_t least_known = 0;
+      std::size_t least_identifying = 0;
       Curve limit{fmt::format("{} limit", noise.name), {}};
       Curve random{fmt::format("{} random", noise.name), {}};
       double at_14 = 0;
@@ -39,7 +39,7 @@ Study study_poses(const StudyOptions& options) {
           ExperimentOptions how;
           how.method = Estimation::ours;
           how.noise = noise;
-          how.insist = true;
+          how.fit_all = true;
           const Experiment experiment(
               arm, is_planned ? planned[k] : planned_poses(arm, counts[k], Planning::random, options.seed),
               how);
@@ -51,12 +51,12 @@ Study study_poses(const StudyOptions& options) {
           row.uncertainty = score.error_of_mean();
           row.limit = experiment.cramer_rao_score();
           if (!experiment.missing().empty())
-            row.remark = fmt::format("{} parameters not known", experiment.missing().size());
+            row.remark = fmt::format("{} parameters not identifiable", experiment.missing().size());
           study.rows.push_back(row);
           const double n = static_cast<double>(counts[k]);
           (is_planned ? ours : random).points.push_back({n, score.mean});
           if (!is_planned) continue;
-          if (least_known == 0 && experiment.missing().empty()) least_known = counts[k];
+          if (least_identifying == 0 && experiment.missing().empty()) least_identifying = counts[k];
           limit.points.push_back({n, *row.limit});
           if (counts[k] == 12) before_14 = score.mean;
           if (counts[k] == 14) at_14 = score.mean;
@@ -67,19 +67,18 @@ Study study_poses(const StudyOptions& options) {
       curves.curves.push_back(limit);
       curves.curves.push_back(random);
       study.notes.push_back(fmt::format(
-          "{} {}: planned, every parameter is known from {} poses on; two poses more gain {:.4f} from "
+          "{} {}: planned, every parameter is identifiable from {} poses on; two poses more gain {:.4f} from "
           "12 to 14 and {:.4f} from 14 to 16.",
-          arm.name, noise.name, least_known, at_14 - before_14, after_14 - at_14));
+          arm.name, noise.name, least_identifying, at_14 - before_14, after_14 - at_14));
     }
     study.figures.push_back({arm.name + ".", curves});
     study.notes.push_back(arm.about);
   }
   study.notes.push_back(
-      "The paper says that 14 is the least number of poses (its preliminary work). Nothing happens at 14: "
-      "every parameter "
-      "has a value from 8 planned poses on, and the score goes on rising as the errors fall with the root of "
-      "the number "
-      "of poses. What 14 planned poses reach, random ones need more poses for.");
+      "The paper says that 14 is the least number of poses (its preliminary work). There is no step at 14: "
+      "every parameter is identifiable from 8 planned poses on, and the errors fall with the root of the "
+      "number "
+      "of poses. Random poses need a larger number for the score of 14 planned ones.");
   return study;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The paper's studies: its figure, ours, and what no unbiased estimator can better, side by side.
+/// The studies of Chen et al. 2019: printed figure, our figure, and the Cramér-Rao limit.
 #ifndef FLEXCOMP_HOST_STUDIES_STUDY_HPP
 #define FLEXCOMP_HOST_STUDIES_STUDY_HPP
 
@@ -16,12 +16,12 @@
 
 namespace flexcomp::host {
 
-/// One result. What a row does not have stays empty.
+/// One result; fields without a value are empty.
 struct StudyRow {
   std::vector<std::string> labels;  ///< one per name in Study::label_names
-  std::optional<double> paper;      ///< what is printed there
+  std::optional<double> paper;      ///< printed figure
   std::optional<double> ours;
-  std::optional<double> uncertainty;  ///< standard deviation of `ours`, which is a mean over repeats
+  std::optional<double> uncertainty;  ///< standard deviation of `ours`, a mean over repeats
   std::optional<double> limit;        ///< the Cramér-Rao limit of the same quantity
   std::string remark;
 };
@@ -31,14 +31,14 @@ struct StudyFigure {
   Curves curves;
 };
 
+/// Result of a study.
 struct Study {
   std::string name;      ///< fig4
-  std::string title;     ///< what it asks
+  std::string title;     ///< subject
   std::string quantity;  ///< "score (1 is perfect)", "mean position error [mm]"
   std::vector<std::string> label_names;
   std::vector<StudyRow> rows;
-  std::vector<std::string>
-      notes;  ///< how it was set up, what comes out, where the paper's figure cannot come from
+  std::vector<std::string> notes;  ///< set-up, result, and limits of the printed figure
   std::vector<StudyFigure> figures;
 };
 
@@ -47,10 +47,10 @@ struct StudyOptions {
   std::vector<NoiseLevel> noises{noise_n1, noise_n2};
   std::size_t repeats = 500;
   std::uint64_t seed = 1;
-  /// Called with what is being done and the share of the work behind; may be empty.
+  /// Called with the current task and the share of the work that is done; may be empty.
   std::function<void(const std::string&, double)> progress;
 
-  void say(const std::string& what, double done) const {
+  void report(const std::string& what, double done) const {
     if (progress) progress(what, done);
   }
 };
@@ -61,8 +61,9 @@ Study study_fig4(const StudyOptions& options);     ///< poses or positions, vari
 Study study_fig8(const StudyOptions& options);     ///< planning and estimator (Section 4)
 Study study_table3(const StudyOptions& options);   ///< residuals of three models (Section 5)
 Study study_poses(const StudyOptions& options);    ///< how many poses are needed
-Study study_payload(const StudyOptions& options);  ///< what the payload is good for
+Study study_payload(const StudyOptions& options);  ///< effect of the payload
 
+/// Entry of the list of studies.
 struct StudyEntry {
   const char* name;
   const char* about;

@@ -15,24 +15,24 @@ namespace flexcomp {
 /// The effect that a term belongs to, so that a set can be read back into names. The numbers are on the wire: add,
 /// never change, never reuse.
 enum class Effect : std::uint8_t {
-  geometric = 0,
-  joint_compliance = 1,
-  link_gravity = 2,
-  nonlinear_compliance = 3,
-  gear_harmonic = 4,
-  joint_curve = 5,
-  backlash = 6,
-  readout_lag = 7,
-  encoder_scale = 8,
-  joint_coupling = 9,
-  axis_wobble = 10,
-  link_bending = 11,
-  thermal_growth = 12,
-  base_drift = 13,
-  base_compliance = 14,
-  payload_error = 15,
-  reflector_slip = 16,
-  unnamed = 17,
+  geometric = 0,             ///< constant of a slot
+  joint_compliance = 1,      ///< angle per load torque (M12)
+  link_gravity = 2,          ///< link weight (M14)
+  nonlinear_compliance = 3,  ///< angle per cube of the load torque
+  gear_harmonic = 4,         ///< sine and cosine of a reading
+  joint_curve = 5,           ///< spline of a reading (M6)
+  backlash = 6,              ///< half the gap, by direction
+  readout_lag = 7,           ///< angle per relative speed; never pushed
+  encoder_scale = 8,         ///< angle per own reading
+  joint_coupling = 9,        ///< angle per another joint's reading
+  axis_wobble = 10,          ///< tilt of an axis by its own reading
+  link_bending = 11,         ///< tilt of a link per load moment
+  thermal_growth = 12,       ///< length per temperature
+  base_drift = 13,           ///< motion of the base in time; never pushed
+  base_compliance = 14,      ///< tilt of the base per load moment
+  payload_error = 15,        ///< mass and centre of mass
+  reflector_slip = 16,       ///< shift of the measured point from a time on; never pushed
+  unnamed = 17,              ///< grid that no other effect explains
 };
 
 /// What physics allows for each coefficient of an effect, SI per unit of the basis.

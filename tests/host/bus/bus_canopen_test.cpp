@@ -362,8 +362,8 @@ const BusAddress address{CanAddress{"vcan9", node}};
 
 ClientOptions quick() {
   ClientOptions out;
-  out.patience = milliseconds(600);
-  out.working = milliseconds(500);
+  out.response_timeout = milliseconds(600);
+  out.write_timeout = milliseconds(500);
   return out;
 }
 

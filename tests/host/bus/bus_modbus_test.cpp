@@ -32,8 +32,8 @@ using testing::HasSubstr;
 
 ClientOptions quick() {
   ClientOptions out;
-  out.patience = milliseconds(600);
-  out.working = milliseconds(500);
+  out.response_timeout = milliseconds(600);
+  out.write_timeout = milliseconds(500);
   return out;
 }
 

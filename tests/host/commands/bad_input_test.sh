@@ -80,10 +80,10 @@ expect 3 "radians.csv" "radians" -- identify radians.csv
 
 # --- too few poses, one orientation: done, but not to be trusted; what is missing and what cures it ---
 head -5 good.csv >few.csv
-expect 5 "cannot know" "would cure it" -- identify few.csv
+expect 5 "not identifiable" "would identify them" -- identify few.csv
 /usr/bin/python3 "$root"/tests/host/commands/upright_poses.py || exit 1
 expect 0 -- "$flexcomp" predict --robot "$robot" --calibration "$truth" --joints upright.csv -o settled.csv --quiet
-expect 5 "cannot know" "would cure it" -- identify settled.csv
+expect 5 "not identifiable" "would identify them" -- identify settled.csv
 
 # --- two identical rows ---
 { cat good.csv; sed -n 9p good.csv; } >twice.csv

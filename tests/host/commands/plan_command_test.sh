@@ -87,7 +87,7 @@ is next.json 'r["measure"] == "position"'
 expect 0 "35 of 39" plan --robot "$robot" --poses 20 --measure position --effort 0.1 -o p.csv
 expect 0 "36 of 39" plan --robot "$robot" --poses 14 --measure reflectors --effort 0.1 -o p.csv
 expect 0 "28 of 30" plan --robot "$robot" --poses 14 --model geometric --effort 0.1 -o p.csv
-expect 0 "beside 12 numbers of the frames" plan --robot "$robot" --poses 14 --frames fit --effort 0.1 -o p.csv
+expect 0 "beside 12 frame parameters" plan --robot "$robot" --poses 14 --frames fit --effort 0.1 -o p.csv
 expect 3 "tool.reflectors_mm" plan --robot "$FLEXCOMP_SOURCE_DIR/host/robots/rx160l.yaml" --poses 14 --measure reflectors -o p.csv
 
 # Too few poses are refused with the least number, on either side of it.
@@ -98,7 +98,7 @@ expect 2 "--poses" plan --robot "$robot" --poses 0 -o p.csv
 expect 2 "--method" plan --robot "$robot" --poses 14 --method best -o p.csv
 expect 3 "absent.yaml" plan --robot "$robot" --cell absent.yaml --poses 14 -o p.csv
 expect 3 "acceptance_deg" plan --robot "$robot" --cell <(echo 'acceptance_deg: -3') --poses 14 -o p.csv
-expect 3 "leaves room" plan --robot "$robot" --poses 14 -o p.csv \
+expect 3 "feasible poses of" plan --robot "$robot" --poses 14 -o p.csv \
   --cell <(echo 'tracker_mm: [0, 0, 20000]'; echo 'acceptance_deg: 0.1')
 
 # Stopped by Ctrl-C: the best plan so far is there, exit status 0, and a resumed search ends where an unbroken one does.

@@ -247,20 +247,20 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
     EstimatorOptions plain_squares;
     plain_squares.robust = false;
     // The fit of the paper's model alone is one of robust weights; again, without them.
-    const Fit none = fit(base.estimate, oracle.before.known.fitted, c.train, c.robot, plain_squares);
-    const double bic_none = none.chi2 + static_cast<double>(oracle.before.known.fitted.count()) * log_n;
+    const Fit none = fit(base.estimate, oracle.before.identifiability.fitted, c.train, c.robot, plain_squares);
+    const double bic_none = none.chi2 + static_cast<double>(oracle.before.identifiability.fitted.count()) * log_n;
     const double bic_truth = bic_none - oracle.hidden.front().detection;
     std::size_t fits = 0;
     double best = bic_none;
     for (const EffectId& id : judging::every_name(c.robot.nominal, c.robot.capsules.front().from_m.z())) {
       if (judging::same_name(id, c.hidden.front().id)) continue;
       if (id.effect == Effect::reflector_slip) continue;
-      ParametricModel model{none.estimate.set, oracle.before.known.fitted.parameters};
+      ParametricModel model{none.estimate.set, oracle.before.identifiability.fitted.parameters};
       const std::size_t first = model.parameters.size();
       add_effect(model, id, c.robot.nominal);
       Estimate start = none.estimate;
       start.set = model.set;
-      Unknowns unknowns = oracle.before.known.fitted;
+      Unknowns unknowns = oracle.before.identifiability.fitted;
       // Whatever is not its own direction is harmless here: a weak prior keeps the fit regular.
       unknowns.prior.resize(first);
       for (std::size_t p = first; p < model.parameters.size(); ++p) {
@@ -273,7 +273,7 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
       // At most one of its own columns is the paper's already.
       const double further = static_cast<double>(model.parameters.size() - first);
       best = std::min(
-          best, fitted.chi2 + (static_cast<double>(oracle.before.known.fitted.count()) + further) * log_n);
+          best, fitted.chi2 + (static_cast<double>(oracle.before.identifiability.fitted.count()) + further) * log_n);
       ++fits;
     }
     EXPECT_GT(fits, 120U);

@@ -48,9 +48,9 @@ std::set<unsigned> joints_with_curves(const Diagnosis& d) {
 Calibration with_effects_of(const Calibration& other, const Identification& start, const MeasuredArm& arm,
                             const std::vector<Observation>& rows) {
   std::set<std::string> names;
-  for (const Parameter& p : start.known.fitted.parameters) names.insert(p.name);
+  for (const Parameter& p : start.identifiability.fitted.parameters) names.insert(p.name);
   Unknowns unknowns;
-  unknowns.frames = start.known.fitted.frames;
+  unknowns.frames = start.identifiability.fitted.frames;
   for (Parameter& p : parameters_of(other.terms, arm.robot.nominal)) {
     if (names.count(p.name) != 0) unknowns.parameters.push_back(std::move(p));
   }

@@ -441,13 +441,13 @@ Oracle oracle_of(const hidden::Case& c) {
       c.row == hidden::Row::geometry ? identify(c.robot, c.train, "training rows", {}) : out.before;
 
   // The model of the paper first, then what is hidden; columns that the earlier ones carry are left out.
-  ParametricModel model{full.fit.estimate.set, full.known.fitted.parameters};
+  ParametricModel model{full.fit.estimate.set, full.identifiability.fitted.parameters};
   const std::size_t of_paper = model.parameters.size();
   hidden::append_hidden(model, c, true);
   Estimate start = full.fit.estimate;
   start.set = model.set;
   Unknowns all;
-  all.frames = full.known.fitted.frames;
+  all.frames = full.identifiability.fitted.frames;
   all.parameters = model.parameters;
   const Fitted truth = fitted(start, independent(start, all, of_paper, rows, c.robot), rows, c.robot);
   out.estimate = truth.estimate;

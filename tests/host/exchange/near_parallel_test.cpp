@@ -125,7 +125,7 @@ TEST(NearParallel, AnArmThatIsSlightlyOffParallelIsFoundWithSmallNumbers) {
         how.pose = pose;
         const Identification r = identify(drawing, measure(truth, how), "data", geometry());
         EXPECT_TRUE(r.fit.converged);
-        EXPECT_TRUE(r.known.missing.empty()) << r.known.missing.front();
+        EXPECT_TRUE(r.identifiability.missing.empty()) << r.identifiability.missing.front();
         EXPECT_LT(longest_mm(r.calibration, drawing), 2) << file << " " << tilt_deg;
         how.seed = 99;
         const double mean = validate(drawing, r.calibration, measure(truth, how), "others").after.mean_m;

@@ -43,7 +43,7 @@ class Repeated : public ::testing::Test {
     options.estimator.robust = false;
     options.physical = physical;
     const Identification exact = identify(robot_, clean_, "clean", options);
-    unknowns_ = exact.known.fitted;
+    unknowns_ = exact.identifiability.fitted;
     // What is lumped (d1 + base z) is what these data mean by the parameter.
     for (const Parameter& p : unknowns_.parameters) true_.push_back(p.get(exact.fit.estimate.set));
     start_.set = paper_model(robot_.nominal, ModelKind::full, true).set;
@@ -260,7 +260,7 @@ TEST(Tolerances, HoldWhatTheDataDoNotKnowAndLeaveTheRest) {
   const Identification held = identify(robot, few, "few", with);
   EXPECT_LT(bare.identifiable, 36U);
   EXPECT_EQ(held.identifiable, 36U);
-  EXPECT_FALSE(held.known.missing.empty()) << "that the data do not know them is still said";
+  EXPECT_FALSE(held.identifiability.missing.empty()) << "that the data do not know them is still said";
   EXPECT_FALSE(held.doubts.empty());
   EXPECT_TRUE(held.fit.converged);
   // In the mean over many sets of few poses prior knowledge helps on poses that were not measured.
@@ -308,19 +308,19 @@ TEST(Payloads, NoneAtAllIsAnsweredWithPosesThatHaveOne) {
   how.payload_kg = {0};
   auto rows = measure(robot, truth(), 40, 3, how);
   const Identification r = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_EQ(r.known.missing.size(), 5U);
-  for (const std::string& name : r.known.missing) EXPECT_EQ(name.rfind("joint_compliance", 0), 0U) << name;
+  EXPECT_EQ(r.identifiability.missing.size(), 5U);
+  for (const std::string& name : r.identifiability.missing) EXPECT_EQ(name.rfind("joint_compliance", 0), 0U) << name;
   EXPECT_FALSE(r.doubts.empty());
-  ASSERT_FALSE(r.known.cure.empty());
-  for (const SuggestedPose& c : r.known.cure) EXPECT_EQ(c.payload_kg, robot.nominal.payload_kg);
+  ASSERT_FALSE(r.identifiability.suggested_poses.empty());
+  for (const SuggestedPose& c : r.identifiability.suggested_poses) EXPECT_EQ(c.payload_kg, robot.nominal.payload_kg);
   const auto model = prepare(truth(), robot, "truth");
   std::mt19937_64 random(8);
-  for (const SuggestedPose& c : r.known.cure) {
+  for (const SuggestedPose& c : r.identifiability.suggested_poses) {
     how.payload_kg = {c.payload_kg};
     rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
   }
   const Identification cured = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_TRUE(cured.known.missing.empty());
+  EXPECT_TRUE(cured.identifiability.missing.empty());
   EXPECT_EQ(cured.identifiable, 36U);
 }
 
@@ -328,13 +328,13 @@ TEST(Payloads, OneIsAnsweredWithWhatASecondWouldGain) {
   const Robot robot = tx60l();
   Measuring how;
   const Identification one = identify(robot, measure(robot, truth(), 200, 3, how), "data", IdentifyOptions());
-  EXPECT_TRUE(one.known.missing.empty());
-  ASSERT_FALSE(one.known.payload_gains.empty());
+  EXPECT_TRUE(one.identifiability.missing.empty());
+  ASSERT_FALSE(one.identifiability.payload_gains.empty());
   how.payload_kg = {0, 1.108};
   const Identification two = identify(robot, measure(robot, truth(), 200, 3, how), "data", IdentifyOptions());
-  EXPECT_TRUE(two.known.payload_gains.empty());
-  for (const PayloadGain& gain : one.known.payload_gains) {
-    const auto& parameters = two.known.fitted.parameters;
+  EXPECT_TRUE(two.identifiability.payload_gains.empty());
+  for (const PayloadGain& gain : one.identifiability.payload_gains) {
+    const auto& parameters = two.identifiability.fitted.parameters;
     const auto p = std::find_if(parameters.begin(), parameters.end(),
                                 [&](const Parameter& q) { return q.name == gain.parameter; });
     const Eigen::Index i = p - parameters.begin();

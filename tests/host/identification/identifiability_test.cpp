@@ -47,7 +47,7 @@ Sizes sizes(const Robot& robot, ModelKind kind, Measured measured, std::size_t p
   const Linearised lin = linearised(estimate, *model, rows, unknowns);
   const Elimination e = eliminate(lin.derivative, elimination_order(unknowns, estimate.set));
   Sizes s{paper.parameters.size(), e.kept.size(), {}};
-  for (const LostColumn& l : e.lost) s.lost.push_back(paper.parameters[l.column].name);
+  for (const DependentColumn& l : e.dependent) s.lost.push_back(paper.parameters[l.column].name);
   return s;
 }
 
@@ -156,14 +156,14 @@ TEST(ModelSizes, EveryLostColumnNamesWhatCarriesIt) {
   const Robot robot = file_of(arms::tx60l());
   const FullModel full = full_model(robot, 200, 10);
   const Elimination e = eliminate(full.derivative, full.order);
-  ASSERT_EQ(e.lost.size(), 3U);
+  ASSERT_EQ(e.dependent.size(), 3U);
   const auto name = [&](std::size_t c) { return full.parameters[c].name; };
-  ASSERT_EQ(e.lost[0].with.size(), 1U);
-  EXPECT_EQ(name(e.lost[0].column), "base.z_mm");
-  EXPECT_EQ(name(e.lost[0].with[0]), "link1.d_mm");
-  ASSERT_EQ(e.lost[1].with.size(), 1U);
-  EXPECT_EQ(name(e.lost[1].with[0]), "link1.theta_deg");
-  EXPECT_TRUE(e.lost[2].with.empty()) << "gravity makes no torque about a vertical axis";
+  ASSERT_EQ(e.dependent[0].with.size(), 1U);
+  EXPECT_EQ(name(e.dependent[0].column), "base.z_mm");
+  EXPECT_EQ(name(e.dependent[0].with[0]), "link1.d_mm");
+  ASSERT_EQ(e.dependent[1].with.size(), 1U);
+  EXPECT_EQ(name(e.dependent[1].with[0]), "link1.theta_deg");
+  EXPECT_TRUE(e.dependent[2].with.empty()) << "gravity makes no torque about a vertical axis";
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ TEST(Identify, NoiseFreePosesGiveThePapersErrorsBack) {
   const Identification r = identify(robot, measure(robot, truth(), 40, 1, how), "data", plain());
   EXPECT_EQ(r.parameters, 39U);
   EXPECT_EQ(r.identifiable, 36U);
-  EXPECT_TRUE(r.known.missing.empty());
+  EXPECT_TRUE(r.identifiability.missing.empty());
   EXPECT_TRUE(r.fit.converged);
   EXPECT_LT(r.after.max_m, 1e-9);
   // Every number itself, with d1 + base z and theta1 + base rz lumped as the names say.
@@ -175,7 +175,7 @@ TEST(Identify, FramesOfAnySizeAreFound) {
     EXPECT_EQ(r.parameters, 33U);
     ASSERT_TRUE(r.calibration.frames);
     EXPECT_NEAR(r.fit.chi2_per_dof(), 1, 0.3);
-    EXPECT_TRUE(r.known.missing.empty());
+    EXPECT_TRUE(r.identifiability.missing.empty());
     EXPECT_NEAR((r.calibration.f().position - how.f.position).norm(), 0, 3e-3);
     EXPECT_LT(held_out(robot, r.calibration, measure(robot, truth(), 50, 22, how)).mean_m, 0.12e-3);
     EXPECT_GT(r.before.nominal_frames.mean_m, 1);
@@ -187,10 +187,10 @@ TEST(Identify, TooFewPosesAreAnsweredWithWhatIsMissing) {
   const Robot robot = tx60l();
   for (const std::size_t count : {2U, 4U, 5U}) {
     const Identification r = identify(robot, measure(robot, truth(), count, 31), "data", IdentifyOptions());
-    EXPECT_FALSE(r.known.missing.empty()) << count;
+    EXPECT_FALSE(r.identifiability.missing.empty()) << count;
     EXPECT_FALSE(r.doubts.empty());
-    EXPECT_EQ(r.identifiable + r.known.missing.size(), 36U) << count;
-    EXPECT_FALSE(r.known.cure.empty());
+    EXPECT_EQ(r.identifiable + r.identifiability.missing.size(), 36U) << count;
+    EXPECT_FALSE(r.identifiability.suggested_poses.empty());
   }
 }
 
@@ -233,12 +233,12 @@ TEST(Identify, OneOrientationIsAnsweredWithWhatIsMissingAndTheCureCures) {
   for (const arms::Joints& q : one_orientation(robot, 40))
     rows.push_back(measure(*model, q, rows.size(), how, random));
   const Identification r = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_FALSE(r.known.missing.empty());
-  ASSERT_FALSE(r.known.cure.empty());
-  ASSERT_LE(r.known.cure.size(), 20U);
-  for (const auto& c : r.known.cure) rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
+  EXPECT_FALSE(r.identifiability.missing.empty());
+  ASSERT_FALSE(r.identifiability.suggested_poses.empty());
+  ASSERT_LE(r.identifiability.suggested_poses.size(), 20U);
+  for (const auto& c : r.identifiability.suggested_poses) rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
   const Identification cured = identify(robot, rows, "data", IdentifyOptions());
-  EXPECT_TRUE(cured.known.missing.empty()) << cured.known.missing.front();
+  EXPECT_TRUE(cured.identifiability.missing.empty()) << cured.identifiability.missing.front();
   EXPECT_EQ(cured.identifiable, 36U);
 }
 

@@ -550,7 +550,7 @@ TEST(Planner, LeastNumberIsTheLeast) {
 TEST(Planner, ExtendsWhatIsMeasured) {
   Task t = task_of(tx60l(), 3);
   const PoseSet measured = random_set(t.problem, 14, 40);
-  t.problem.take_as_known(t.problem.blocks(measured));
+  t.problem.set_measured(t.problem.blocks(measured));
   const auto search = make_search(Method::refine, t.problem, 0.1, 1);
   while (!search->done()) search->step();
   ASSERT_EQ(search->best().size(), 3U);
@@ -591,18 +591,18 @@ TEST(Planner, TravelsLittleAndChangesThePayloadOnce) {
     return rows;
   };
   EXPECT_EQ(sorted(ordered), sorted(set));
-  EXPECT_LT(way(ordered, speed), 0.75 * way(set, speed));
+  EXPECT_LT(path_length(ordered, speed), 0.75 * path_length(set, speed));
   // The light one first: payloads[1].
   for (std::size_t k = 1; k < ordered.size(); ++k) EXPECT_LE(ordered[k].payload, ordered[k - 1].payload);
   // Few poses: the shortest path of all 720.
   PoseSet few = random_set(task_of(tx60l(), 6).problem, 6, 51);
-  const double found = way(in_order_of_travel(t.problem, few, speed), speed);
+  const double found = path_length(in_order_of_travel(t.problem, few, speed), speed);
   double shortest = HUGE_VAL;
   std::array<std::size_t, 6> order{0, 1, 2, 3, 4, 5};
   do {
     PoseSet path;
     for (const std::size_t k : order) path.push_back(few[k]);
-    shortest = std::min(shortest, way(path, speed));
+    shortest = std::min(shortest, path_length(path, speed));
   } while (std::next_permutation(order.begin(), order.end()));
   EXPECT_LE(found, 1.05 * shortest);
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A file descriptor that is closed when its owner goes.
-#ifndef FLEXCOMP_HIL_CONTROLLER_DESCRIPTOR_HPP
-#define FLEXCOMP_HIL_CONTROLLER_DESCRIPTOR_HPP
+/// File descriptor that is closed by its destructor.
+#ifndef FLEXCOMP_HOST_BUS_DESCRIPTOR_HPP
+#define FLEXCOMP_HOST_BUS_DESCRIPTOR_HPP
 
 #include <unistd.h>
 
 #include <utility>
 
-namespace flexcomp::hil {
+namespace flexcomp::host {
 
 class Descriptor {
  public:
@@ -35,6 +35,6 @@ class Descriptor {
   int fd_ = -1;
 };
 
-}  // namespace flexcomp::hil
+}  // namespace flexcomp::host
 
 #endif
