@@ -3,25 +3,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "commands/answers.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/numbers.hpp"
 #include "commands/outputs.hpp"
-#include "commands/progress_bar.hpp"
-#include "exchange/arm_sides.hpp"
-#include "exchange/target_program.hpp"
+#include "commands/program_targets.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
@@ -32,7 +23,6 @@
 #include "input_error.hpp"
 #include "kinematics/nominal_inverse.hpp"
 #include "model/parameter_image.hpp"
-#include "quaternion.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -44,138 +34,21 @@ struct Compensate {
   std::string calibration;
   std::string targets;
   std::string out;
-  std::string format;
-  std::vector<double> start;
-  std::vector<double> frame;  // x y z mm, rx ry rz deg
+  ProgramTargets programs;
   bool allow_unnamed = false;
   bool force = false;
 
-  void run() const;
-
- private:
-  TargetsFile from_program(const TargetProgram& program, const Robot& robot_file) const;
-  std::string to_program(const TargetProgram& program, const Robot& robot_file,
-                         const std::vector<Answer>& answers) const;
-  Pose<double> program_frame() const;
+  void run();
 };
 
-const std::map<std::string, ProgramLanguage> program_languages{
-    {"kuka", ProgramLanguage::kuka}, {"rapid", ProgramLanguage::rapid}, {"val3", ProgramLanguage::val3}};
-
-/// F0 as seen from the frame in which the program's poses are.
-Pose<double> Compensate::program_frame() const {
-  if (frame.empty()) return {};
-  return small_pose<double>({frame[0] * 1e-3, frame[1] * 1e-3, frame[2] * 1e-3, radians(frame[3]),
-                             radians(frame[4]), radians(frame[5])});
-}
-
-/// The program's targets as joint commands. A pose is taken on the branch that its words name; where several remain, on
-/// the one that is nearest to the command before.
-TargetsFile Compensate::from_program(const TargetProgram& program, const Robot& robot_file) const {
-  TargetsFile list;
-  list.path = targets;
-  list.warnings = program.warnings;
-  std::optional<std::array<double, joint_count>> before;
-  if (!start.empty()) {
-    before.emplace();
-    for (std::size_t j = 0; j < joint_count; ++j) (*before)[j] = radians(start[j]);
-  }
-  const Pose<double> f0 = program_frame();
-  ProgressBar bar("solving poses", common.quiet);
-  for (const ProgramTarget& t : program.targets) {
-    Target target;
-    target.line = t.line;
-    target.context = default_context<double>(robot_file.nominal);
-    target.q_rad = t.q_rad;
-    if (t.pose) {
-      const Eigen::Matrix3d turned = f0.rotation.transpose();
-      const Pose<double> pose{turned * t.orientation.toRotationMatrix(),
-                              turned * (t.position_m - f0.position)};
-      std::vector<std::array<double, joint_count>> all = nominal_inverses(robot_file.nominal, pose);
-      const std::size_t solutions = all.size();
-      std::erase_if(all, [&t](const auto& q) { return !words_fit(t, q); });
-      if (all.empty()) {
-        throw InputError(
-            targets, t.line, t.name,
-            "a pose that the nominal arm reaches with its tool, in F0 (--frame says where F0 is)",
-            solutions == 0
-                ? std::string("one that it does not reach")
-                : fmt::format("{} ways to reach it, none with the turns that it asks for", solutions));
-      }
-      // Only where several remain: there are programs whose cfx was never looked at.
-      if (all.size() > 1 && t.cfx) {
-        std::vector<std::array<double, joint_count>> as_said;
-        std::copy_if(all.begin(), all.end(), std::back_inserter(as_said), [&](const auto& q) {
-          const auto sides = arm_sides(robot_file.nominal, q);
-          return sides && fits_cfx(*sides, *t.cfx);
-        });
-        if (!as_said.empty()) {
-          all = std::move(as_said);
-        } else {
-          list.warnings.push_back(
-              fmt::format("{}:{}: {}{}cfx {} fits none of {} ways to reach the pose: the nearest is taken.",
-                          targets, t.line, t.name, t.name.empty() ? "" : ": ", *t.cfx, all.size()));
-        }
-      }
-      if (all.size() > 1 && !before) {
-        throw InputError(targets, t.line, t.name,
-                         "--start q1,…,q6, the joints at the beginning, of which the nearest way is taken",
-                         fmt::format("{} ways to reach the pose", all.size()));
-      }
-      const auto away = [&before](const auto& q) {
-        double most = 0;
-        for (std::size_t j = 0; before && j < joint_count; ++j)
-          most = std::max(most, std::abs(q[j] - (*before)[j]));
-        return most;
-      };
-      target.q_rad = *std::min_element(all.begin(), all.end(),
-                                       [&](const auto& a, const auto& b) { return away(a) < away(b); });
-    }
-    before = target.q_rad;
-    list.rows.push_back(std::move(target));
-    bar.show(list.rows.size(), program.targets.size());
-  }
-  return list;
-}
-
-/// A corrected pose is the one that brings the robot's own nominal kinematics to the corrected joints.
-std::string Compensate::to_program(const TargetProgram& program, const Robot& robot_file,
-                                   const std::vector<Answer>& answers) const {
-  Model<double, joint_count, Capacity<1, 1, 6>> nominal;
-  nominal.begin(robot_file.nominal);
-  nominal.finish();
-  const Pose<double> f0 = program_frame();
-  std::vector<ProgramTarget> corrected = program.targets;
-  for (std::size_t k = 0; k < corrected.size(); ++k) {
-    ProgramTarget& t = corrected[k];
-    t.q_rad = answers[k].q_rad;
-    if (!t.pose) continue;
-    const Pose<double> pose = f0 * nominal_forward(nominal, t.q_rad);
-    t.position_m = pose.position;
-    t.orientation = unit_quaternion(pose.rotation);
-    if (t.turn) t.turn = turn_of(t.q_rad, *t.turn);
-    if (t.quadrant) t.quadrant = quadrants_of(t.q_rad, *t.quadrant);
-  }
-  return program_text(program, corrected);
-}
-
-void Compensate::run() const {
+void Compensate::run() {
   refuse_same_file({{"--robot", robot}, {"--calibration", calibration}, {"--targets", targets}},
                    {{"-o", out}, {"--json", common.json}});
   const Robot robot_file = load_robot(robot);
   const Calibration set = load_calibration(calibration, robot_file);
-  std::optional<ProgramLanguage> language = program_language(targets);
-  if (!format.empty()) {
-    language.reset();
-    if (format != "csv") language = program_languages.at(format);
-  }
-  if (!language && !(start.empty() && frame.empty()))
-    throw CLI::ValidationError("--start, --frame",
-                               "belong to programs; a .csv has seeds of its own and poses in F0");
-  std::optional<TargetProgram> program;
-  if (language) program = read_program(targets, *language);
+  const bool of_program = programs.read(targets);
   const TargetsFile list =
-      program ? from_program(*program, robot_file) : load_targets(targets, robot_file, {force});
+      of_program ? programs.commands(robot_file, common.quiet) : load_targets(targets, robot_file, {force});
   common.warn(list.warnings);
 
   // Through the image and a model of the controller's size: what is answered here is what the controller answers.
@@ -198,11 +71,11 @@ void Compensate::run() const {
     }
     answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status});
   }
-  write_file(out, program ? to_program(*program, robot_file, answers) : answers_text(list, answers));
+  write_file(out, of_program ? programs.corrected(robot_file, answers) : answers_text(list, answers));
   // A program has no column for what the controller would say.
-  for (std::size_t k = 0; program && k < answers.size(); ++k) {
+  for (std::size_t k = 0; of_program && k < answers.size(); ++k) {
     if (answers[k].status == StepStatus::ok) continue;
-    const std::string& target = program->targets[k].name;
+    const std::string& target = programs.name(k);
     common.warn({fmt::format("{}:{}: {}{} is {}.", targets, list.rows[k].line, target,
                              target.empty() ? "the target" : "", name(answers[k].status))});
   }
@@ -240,24 +113,7 @@ void add_compensate(CLI::App& app) {
           "corrected")
       ->type_name("FILE")
       ->required();
-  command
-      ->add_option("--format", options->format, "How the targets are written [default: by the file's ending]")
-      ->check(CLI::IsMember({"csv", "kuka", "rapid", "val3"}));
-  command
-      ->add_option("--start", options->start,
-                   "Joints where a program begins [deg]: of several ways to a pose the nearest is taken")
-      ->delimiter(',')
-      ->expected(6)
-      ->check(finite_number())
-      ->type_name("Q1,…,Q6");
-  command
-      ->add_option("--frame", options->frame,
-                   "Where F0 is in the frame of a program's poses: x,y,z,rx,ry,rz [mm, deg], turned by "
-                   "Rot(z,rz) Rot(y,ry) Rot(x,rx)")
-      ->delimiter(',')
-      ->expected(6)
-      ->check(finite_number())
-      ->type_name("X,Y,Z,RX,RY,RZ");
+  options->programs.add_to(*command);
   command->add_flag("--allow-unnamed", options->allow_unnamed, "Also use what was found but not understood");
   add_force_option(*command, options->force);
   options->common.add_to(*command);

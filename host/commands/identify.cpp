@@ -20,6 +20,7 @@
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
+#include "files/tolerance_file.hpp"
 #include "files/write_file.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"

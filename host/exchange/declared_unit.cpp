@@ -75,43 +75,43 @@ bool is_unit(std::string_view word) {
   return length_unit_of(word) || angle_unit_of(word) || time_unit_of(word) || is_foreign_unit(word);
 }
 
+/// What lies beyond ASCII counts as letters, as the sigma of "σx".
+bool in_word(char c) {
+  const auto byte = static_cast<unsigned char>(c);
+  return std::isalnum(byte) != 0 || byte >= 0x80;
+}
+
 std::string letters_and_digits(std::string_view text) {
-  std::string out;
-  for (const char c : lower(text)) {
-    // What lies beyond ASCII stays: the sigma of "σx" is a letter.
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0 || static_cast<unsigned char>(c) >= 0x80) out += c;
-  }
+  std::string out = lower(text);
+  std::erase_if(out, [](char c) { return !in_word(c); });
   return out;
 }
 
 /// Words in lower case, and what stands between them but blanks, a character each.
-std::vector<std::string> tokens_of(std::string_view line) {
+std::vector<std::string> tokens_of(std::string_view written) {
+  const std::string line = lower(written);
   std::vector<std::string> tokens;
-  bool in_word = false;
+  bool goes_on = false;
   for (std::size_t k = 0; k < line.size(); ++k) {
-    const auto c = static_cast<unsigned char>(line[k]);
+    const char c = line[k];
     // "Unit(s)", "millimeter(s)"
-    if (in_word && line.substr(k, 3) == "(s)") {
+    if (goes_on && line.compare(k, 3, "(s)") == 0) {
       tokens.back() += 's';
       k += 2;
-      in_word = false;
+      goes_on = false;
       continue;
     }
-    const bool part = std::isalnum(c) != 0 || c >= 0x80;
-    if (part && in_word) {
-      tokens.back() += static_cast<char>(std::tolower(c));
+    if (in_word(c) && goes_on) {
+      tokens.back() += c;
     } else if (c != ' ' && c != '\t') {
-      tokens.emplace_back(1, static_cast<char>(std::tolower(c)));
+      tokens.emplace_back(1, c);
     }
-    in_word = part;
+    goes_on = in_word(c);
   }
   return tokens;
 }
 
-bool is_word(const std::string& token) {
-  const auto c = static_cast<unsigned char>(token.front());
-  return std::isalnum(c) != 0 || c >= 0x80;
-}
+bool is_word(const std::string& token) { return in_word(token.front()); }
 
 /// A line's words as far as they tell units.
 class Declaration {

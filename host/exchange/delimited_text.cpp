@@ -219,6 +219,10 @@ std::optional<double> parse_number(std::string_view text, char decimal, const Un
   return parse_si(number, unit);
 }
 
+bool is_number(std::string_view text) {
+  return parse_number(text, '.', unit::si) || parse_number(text, ',', unit::si);
+}
+
 void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given,
                                    const std::vector<std::size_t>& small, const char* how) {
   if (given) {
@@ -274,12 +278,21 @@ double DelimitedText::number(const TextRow& row, std::size_t column, const Unit&
       cell.empty() ? "an empty field" : "'" + cell + "'");
 }
 
+TimeStamp DelimitedText::time(const TextRow& row, std::size_t column, const std::string& text,
+                              const Unit& unit) const {
+  if (const auto stamp = time_stamp(text, unit, dialect.decimal)) return *stamp;
+  throw InputError(path, row.line, column_label(column), "seconds, 12:30:05.25 or 2026-03-01T12:30:05.25",
+                   "'" + text + "'");
+}
+
 std::string DelimitedText::column_label(std::size_t column) const {
   return header ? header->cells[column] : fmt::format("column {}", column + 1);
 }
 
-DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
-                             const std::string& header) {
+namespace {
+
+/// The text in UTF-8, without byte order mark. \throws InputError  UTF-16 or no text
+std::string decoded(const std::string& path) {
   const std::string content = read_file(path);
   std::string_view text = content;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -288,90 +301,107 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
     throw InputError(path, 0, "", "text in UTF-8 or Latin-1 (export it so, or: iconv -f UTF-16 -t UTF-8)",
                      "UTF-16 or no text");
   }
-  const std::string decoded = is_utf8(text) ? std::string() : from_latin1(text);
-  if (!decoded.empty()) text = decoded;
-  const std::vector<Line> lines = lines_of(path, text);
-  if (lines.empty()) throw InputError(path, 0, "", "a table of measured points or joints", "nothing in it");
-  std::vector<char> tried(delimiters.begin(), delimiters.end());
-  if (choice.delimiter) tried = {*choice.delimiter};
+  return is_utf8(text) ? std::string(text) : from_latin1(text);
+}
 
-  DelimitedText out;
-  out.path = path;
-  std::size_t next = 0;
-  for (; next < lines.size() && !out.header; ++next) {
+void add_remark(DelimitedText& table, const Line& line) {
+  table.remarks.emplace_back(line.text);
+  table.remark_lines.push_back(line.number);
+}
+
+/// Sets header and delimiter. Returns the index of the header's line; nothing where there is none.
+std::optional<std::size_t> find_header(DelimitedText& out, const std::vector<Line>& lines,
+                                       const std::vector<char>& tried, const IsHeader& is_header) {
+  for (std::size_t k = 0; k < lines.size(); ++k) {
     for (const char delimiter : tried) {
-      auto cells = split(lines[next].text, delimiter);
+      auto cells = split(lines[k].text, delimiter);
       if (!cells) continue;
       if (cells->size() > 1 && cells->back().empty()) cells->pop_back();
       if (!is_header(*cells)) continue;
       out.dialect.delimiter = delimiter;
-      out.header = TextRow{lines[next].number, std::move(*cells)};
-      break;
+      out.header = TextRow{lines[k].number, std::move(*cells)};
+      return k;
     }
-    if (out.header) break;
   }
-  const auto remark = [&out](const Line& line) {
-    out.remarks.emplace_back(line.text);
-    out.remark_lines.push_back(line.number);
-  };
-  if (out.header) {
-    for (std::size_t k = 0; k < next; ++k) remark(lines[k]);
-    for (std::size_t k = next + 1; k < lines.size(); ++k) {
-      if (lines[k].comment) {
-        remark(lines[k]);
-        continue;
-      }
-      auto cells = split(lines[k].text, out.dialect.delimiter);
-      const std::size_t wanted = out.header->cells.size();
-      if (cells) drop_empty_end(*cells, wanted);
-      if (!cells || cells->size() != wanted) {
-        throw wrong_cells(path, lines[k], out.dialect, wanted, cells ? cells->size() : 0, "as in the header");
-      }
-      out.rows.push_back({lines[k].number, std::move(*cells)});
-    }
-    if (out.rows.empty()) throw InputError(path, 0, "", "a row below the header", "none");
-    return out;
-  }
+  return {};
+}
 
-  if (!header.empty()) {
-    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text));
+void read_below_header(DelimitedText& out, const std::vector<Line>& lines, std::size_t header) {
+  const std::size_t wanted = out.header->cells.size();
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    if (k == header) continue;
+    if (k < header || lines[k].comment) {
+      add_remark(out, lines[k]);
+      continue;
+    }
+    auto cells = split(lines[k].text, out.dialect.delimiter);
+    if (cells) drop_empty_end(*cells, wanted);
+    if (!cells || cells->size() != wanted) {
+      throw wrong_cells(out.path, lines[k], out.dialect, wanted, cells ? cells->size() : 0,
+                        "as in the header");
+    }
+    out.rows.push_back({lines[k].number, std::move(*cells)});
   }
+  if (out.rows.empty()) throw InputError(out.path, 0, "", "a row below the header", "none");
+}
+
+/// By the one dialect in which all lines but remarks are rows.
+void read_without_header(DelimitedText& out, const std::vector<Line>& lines, const std::vector<char>& tried,
+                         const std::optional<char>& decimal) {
   std::vector<Line> table;
   for (const Line& line : lines) {
     if (line.comment || (table.empty() && is_remark(line.text))) {
-      remark(line);
+      add_remark(out, line);
     } else {
       table.push_back(line);
     }
   }
-  if (table.empty()) throw InputError(path, 0, "", "a table", "comments alone");
+  if (table.empty()) throw InputError(out.path, 0, "", "a table", "comments alone");
   std::optional<Headerless> found;
-  std::size_t readable = 0;  // rows before the line that stands against every way
+  std::size_t readable = 0;  // rows before the line that stands against every dialect
   for (const char delimiter : tried) {
-    for (const char decimal : {'.', ','}) {
-      if (choice.decimal && *choice.decimal != decimal) continue;
-      Headerless rows = as_rows(table, {delimiter, decimal});
+    for (const char mark : {'.', ','}) {
+      if (decimal && *decimal != mark) continue;
+      Headerless rows = as_rows(table, {delimiter, mark});
       readable = std::max(readable, rows.rows.size());
       if (rows.rows.size() != table.size()) continue;
       if (found && !same_cells(*found, rows)) {
-        throw InputError(path, table.front().number, "",
+        throw InputError(out.path, table.front().number, "",
                          "one way to part the fields (--delimiter and --decimal say which)",
                          fmt::format("{} as well as {}", words(found->dialect), words(rows.dialect)));
       }
       if (!found) found = std::move(rows);
     }
   }
-  if (found) {
-    out.dialect = found->dialect;
-    out.rows = std::move(found->rows);
-    return out;
+  if (!found) {
+    throw InputError(out.path, table[readable].number, "",
+                     "a header with the names of the columns, or a row as the ones before whose last three "
+                     "fields are numbers",
+                     fmt::format("'{}'", table[readable].text));
   }
-  const Line* const bad = &table[readable];
-  throw InputError(
-      path, bad->number, "",
-      "a header with the names of the columns, or a row as the ones before whose last three fields are "
-      "numbers",
-      fmt::format("'{}'", bad->text));
+  out.dialect = found->dialect;
+  out.rows = std::move(found->rows);
+}
+
+}  // namespace
+
+DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
+                             const std::string& header) {
+  const std::string text = decoded(path);
+  const std::vector<Line> lines = lines_of(path, text);
+  if (lines.empty()) throw InputError(path, 0, "", "a table of measured points or joints", "nothing in it");
+  std::vector<char> tried(delimiters.begin(), delimiters.end());
+  if (choice.delimiter) tried = {*choice.delimiter};
+  DelimitedText out;
+  out.path = path;
+  if (const auto at = find_header(out, lines, tried, is_header)) {
+    read_below_header(out, lines, *at);
+  } else if (!header.empty()) {
+    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text));
+  } else {
+    read_without_header(out, lines, tried, choice.decimal);
+  }
+  return out;
 }
 
 }  // namespace flexcomp::host

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "exchange/time_stamp.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -50,6 +51,8 @@ class DelimitedText {
 
   /// A cell in SI. `name` is the column's, for messages. \throws InputError  empty or no finite number in this dialect
   double number(const TextRow& row, std::size_t column, const Unit& unit) const;
+  /// The time stamp in this text of a cell or two. \throws InputError  none that is known
+  TimeStamp time(const TextRow& row, std::size_t column, const std::string& text, const Unit& unit) const;
   std::string column_label(std::size_t column) const;  ///< "Y" or "column 3"
 };
 
@@ -68,6 +71,9 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
 
 /// A number with this decimal mark and no other sign in it; nothing where it is none.
 std::optional<double> parse_number(std::string_view text, char decimal, const Unit& unit);
+
+/// Whether this is a number with either decimal mark.
+bool is_number(std::string_view text);
 
 }  // namespace flexcomp::host
 

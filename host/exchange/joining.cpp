@@ -9,9 +9,9 @@
 #include <map>
 #include <numeric>
 #include <optional>
-#include <string_view>
 #include <utility>
 
+#include "exchange/name_pattern.hpp"
 #include "files/data_file.hpp"
 #include "input_error.hpp"
 
@@ -33,146 +33,64 @@ std::string shown(const LogRow& r) {
   return r.name.empty() ? fmt::format("line {}", r.line) : fmt::format("{} (line {})", r.name, r.line);
 }
 
-/// What a name says by a pattern. Of several ways to match, each wildcard takes as much as it can, from the left. In time
-/// and memory of the name's length: names come out of files.
-class NamePattern {
- public:
-  explicit NamePattern(const std::string& pattern) {
-    const auto refuse = [&pattern](const std::string& expected) {
-      throw InputError("", 0, "--names", expected, "'" + pattern + "'");
-    };
-    for (std::size_t k = 0; k < pattern.size();) {
-      const auto take = [&](std::string_view word, Kind kind) {
-        if (pattern.compare(k, word.size(), word) != 0) return false;
-        if (kind != Kind::anything && has(kind)) refuse(fmt::format("{} once", word));
-        // Two stars are one.
-        if (parts_.empty() || parts_.back().kind != kind) parts_.push_back({kind, {}});
-        k += word.size();
-        return true;
-      };
-      if (take("{pose}", Kind::pose) || take("{reflector}", Kind::reflector) || take("*", Kind::anything))
-        continue;
-      if (parts_.empty() || parts_.back().kind != Kind::text) parts_.push_back({Kind::text, {}});
-      parts_.back().text += pattern[k++];
-    }
-    if (!has(Kind::pose)) refuse("{pose} where the name of the pose stands");
-    for (std::size_t k = 1; k < parts_.size(); ++k) {
-      const auto beside = [&](Kind a, Kind b) { return parts_[k - 1].kind == a && parts_[k].kind == b; };
-      if (beside(Kind::anything, Kind::pose) || beside(Kind::pose, Kind::anything))
-        refuse("something between * and {pose}, or nobody knows where the pose's name begins and ends");
-    }
-  }
-
-  bool has_reflectors() const { return has(Kind::reflector); }
-
-  /// Pose and reflector (0 … 3), or nothing where the name is another one.
-  std::optional<std::pair<std::string, std::size_t>> read(const std::string& name) const {
-    // matches[p][k]: whether the parts from p on match the name from k on.
-    std::vector<std::vector<bool>> matches(parts_.size() + 1, std::vector<bool>(name.size() + 1));
-    matches.back()[name.size()] = true;
-    for (std::size_t p = parts_.size(); p-- > 0;) {
-      const Part& part = parts_[p];
-      const std::vector<bool>& after = matches[p + 1];
-      for (std::size_t k = name.size() + 1; k-- > 0;) {
-        const bool more = k < name.size();
-        if (part.kind == Kind::text) {
-          matches[p][k] = k + part.text.size() <= name.size() && after[k + part.text.size()] &&
-                          name.compare(k, part.text.size(), part.text) == 0;
-        } else if (part.kind == Kind::reflector) {
-          matches[p][k] = more && reflector_of(name[k]) && after[k + 1];
-        } else if (part.kind == Kind::pose) {
-          matches[p][k] = more && (after[k + 1] || matches[p][k + 1]);
-        } else {
-          matches[p][k] = after[k] || (more && matches[p][k + 1]);
-        }
-      }
-    }
-    if (!matches.front()[0]) return {};
-    std::pair<std::string, std::size_t> out;
-    std::size_t from = 0;
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
-      const Part& part = parts_[p];
-      std::size_t to = name.size();
-      if (part.kind == Kind::text) to = from + part.text.size();
-      if (part.kind == Kind::reflector) to = from + 1;
-      while (!matches[p + 1][to]) --to;
-      if (part.kind == Kind::pose) out.first = name.substr(from, to - from);
-      if (part.kind == Kind::reflector) out.second = *reflector_of(name[from]);
-      from = to;
-    }
-    return out;
-  }
-
- private:
-  enum class Kind { text, anything, pose, reflector };
-  struct Part {
-    Kind kind;
-    std::string text;
-  };
-
-  bool has(Kind kind) const {
-    return std::any_of(parts_.begin(), parts_.end(), [kind](const Part& p) { return p.kind == kind; });
-  }
-
-  static std::optional<std::size_t> reflector_of(char c) {
-    const auto at = std::string_view("abcdABCD1234").find(c);
-    return at == std::string_view::npos ? std::optional<std::size_t>() : at % 4;
-  }
-
-  std::vector<Part> parts_;
-};
-
 std::string last_part(const std::string& name) {
   const auto at = name.rfind("::");
   return at == std::string::npos ? name : name.substr(at + 2);
 }
 
-/// The points by pose, in the order in which poses first appear.
-std::vector<Group> groups_by_name(const PointList& list, const RobotLog& log, const JoinOptions& options,
-                                  std::vector<std::string>& lonely) {
+InputError seen_before(const PointList& list, const ListedPoint& p, const ListedPoint& before,
+                       const char* hint) {
+  return {list.path, p.line, p.name, fmt::format("a point that line {} has not{}", before.line, hint),
+          "the same name again"};
+}
+
+const char* const other_name = ", a name of another kind";
+
+/// Each point alone, in the order of the list. Without a pattern its name is the pose's, or the last part of it where the
+/// log's names have none.
+std::vector<Group> single_points(const PointList& list, const RobotLog& log, bool repeats,
+                                 const std::optional<NamePattern>& pattern,
+                                 std::vector<std::string>& lonely) {
   std::vector<Group> out;
   const bool parts = std::any_of(log.rows.begin(), log.rows.end(),
                                  [](const LogRow& r) { return r.name.find("::") != std::string::npos; });
-  const auto once = [&list](const ListedPoint& p, const ListedPoint& before, const char* hint) {
-    throw InputError(list.path, p.line, p.name,
-                     fmt::format("a point that line {} has not{}", before.line, hint), "the same name again");
-  };
-  if (options.names.empty() || !NamePattern(options.names).has_reflectors()) {
-    std::optional<NamePattern> pattern;
-    if (!options.names.empty()) pattern.emplace(options.names);
-    std::map<std::string, const ListedPoint*> seen;
-    for (const ListedPoint& p : list.points) {
-      std::string key = parts ? p.name : last_part(p.name);
-      if (pattern) {
-        const auto read = pattern->read(p.name);
-        if (!read) {
-          lonely.push_back(shown(p) + ", a name of another kind");
-          continue;
-        }
-        key = read->first;
+  std::map<std::string, const ListedPoint*> seen;
+  for (const ListedPoint& p : list.points) {
+    std::string key = parts ? p.name : last_part(p.name);
+    if (pattern) {
+      const auto read = pattern->read(p.name);
+      if (!read) {
+        lonely.push_back(shown(p) + other_name);
+        continue;
       }
-      const auto [at, is_new] = seen.emplace(key, &p);
-      if (!is_new && !options.repeats) {
-        once(p, *at->second,
-             " (--repeats: the pose was measured again; --names: what in the name is the pose)");
-      }
-      out.push_back({p.name, key, {&p}});
+      key = read->first;
     }
-    return out;
+    const auto [at, is_new] = seen.emplace(key, &p);
+    if (!is_new && !repeats) {
+      throw seen_before(list, p, *at->second,
+                        " (--repeats: the pose was measured again; --names: what in the name is the pose)");
+    }
+    out.push_back({p.name, key, {&p}});
   }
-  const NamePattern pattern(options.names);
+  return out;
+}
+
+/// The reflectors of each pose, in the order in which poses first appear.
+std::vector<Group> reflector_groups(const PointList& list, const NamePattern& pattern,
+                                    std::vector<std::string>& lonely) {
+  std::vector<Group> out;
   std::map<std::string, std::array<const ListedPoint*, 4>> poses;
   std::vector<std::string> order;
   for (const ListedPoint& p : list.points) {
     const auto read = pattern.read(p.name);
     if (!read) {
-      lonely.push_back(shown(p) + ", a name of another kind");
+      lonely.push_back(shown(p) + other_name);
       continue;
     }
     const auto [at, is_new] = poses.emplace(read->first, std::array<const ListedPoint*, 4>{});
     if (is_new) order.push_back(read->first);
     const ListedPoint*& place = at->second[read->second];
-    if (place != nullptr) once(p, *place, "");
+    if (place != nullptr) throw seen_before(list, p, *place, "");
     place = &p;
   }
   std::size_t with_d = 0;
@@ -214,6 +132,14 @@ std::vector<Group> groups_by_name(const PointList& list, const RobotLog& log, co
     }
   }
   return out;
+}
+
+std::vector<Group> groups_by_name(const PointList& list, const RobotLog& log, const JoinOptions& options,
+                                  std::vector<std::string>& lonely) {
+  std::optional<NamePattern> pattern;
+  if (!options.names.empty()) pattern.emplace(options.names);
+  return pattern && pattern->has_reflectors() ? reflector_groups(list, *pattern, lonely)
+                                              : single_points(list, log, options.repeats, pattern, lonely);
 }
 
 std::vector<Group> groups_by_order(const PointList& list, std::size_t size) {

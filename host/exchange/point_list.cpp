@@ -88,8 +88,8 @@ class PointReader {
       // With columns that the user names the header only has to be none of the rows.
       if (cells.size() != given.size()) return false;
       for (std::size_t k = 0; k < cells.size(); ++k) {
-        const bool number = parse_number(cells[k], '.', unit::si) || parse_number(cells[k], ',', unit::si);
-        if (given[k] != "-" && !is_name(given[k]) && given[k] != "time" && given[k] != "date" && number)
+        if (given[k] != "-" && !is_name(given[k]) && given[k] != "time" && given[k] != "date" &&
+            is_number(cells[k]))
           return false;
       }
       return true;
@@ -187,7 +187,7 @@ class PointReader {
       bool fine = true;
       for (std::size_t k = 0; k + 3 < count; ++k) {
         const std::string& cell = row.cells[k];
-        if (!parse_number(cell, '.', unit::si) && !parse_number(cell, ',', unit::si)) continue;
+        if (!is_number(cell)) continue;
         numbers = true;
         fine = fine && cell.find_first_of(".,eE") == std::string::npos;
       }
@@ -286,10 +286,8 @@ class PointReader {
   /// Of times that are numbers: "Time [UTC]" with times of day needs none.
   void find_time_unit(const UnitSource& declared) {
     const std::size_t column = columns_.at("time");
-    const auto is_number = [this, column](const TextRow& row) {
-      return parse_number(row.cells[column], '.', unit::si) || parse_number(row.cells[column], ',', unit::si);
-    };
-    if (has("date") || std::none_of(table_.rows.begin(), table_.rows.end(), is_number)) return;
+    const auto counts = [column](const TextRow& row) { return is_number(row.cells[column]); };
+    if (has("date") || std::none_of(table_.rows.begin(), table_.rows.end(), counts)) return;
     time_ = agreed({"time"}, {declared}, {}, time_unit_of, "time", time_unit_names()).value_or(unit::si);
   }
 
@@ -348,12 +346,7 @@ class PointReader {
       const std::size_t column = columns_.at("time");
       const std::string text =
           has("date") ? row.cells[columns_.at("date")] + " " + row.cells[column] : row.cells[column];
-      const auto time = time_stamp(text, time_, table_.dialect.decimal);
-      if (!time) {
-        throw InputError(table_.path, row.line, table_.column_label(column),
-                         "seconds, 12:30:05.25 or 2026-03-01T12:30:05.25", "'" + text + "'");
-      }
-      p.time = *time;
+      p.time = table_.time(row, column, text, time_);
     }
     return p;
   }

@@ -7,8 +7,8 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <iterator>
 #include <string>
+#include <string_view>
 
 #include "model/calibration.hpp"
 
@@ -17,100 +17,15 @@ namespace flexcomp::host {
 namespace {
 
 /// Keywords and alternative tokens of C17 and C++20 that the name of a robot could become.
-constexpr std::string_view keywords[] = {"alignas",
-                                         "alignof",
-                                         "and",
-                                         "and_eq",
-                                         "asm",
-                                         "auto",
-                                         "bitand",
-                                         "bitor",
-                                         "bool",
-                                         "break",
-                                         "case",
-                                         "catch",
-                                         "char",
-                                         "char8_t",
-                                         "char16_t",
-                                         "char32_t",
-                                         "class",
-                                         "co_await",
-                                         "co_return",
-                                         "co_yield",
-                                         "compl",
-                                         "concept",
-                                         "const",
-                                         "const_cast",
-                                         "consteval",
-                                         "constexpr",
-                                         "constinit",
-                                         "continue",
-                                         "decltype",
-                                         "default",
-                                         "delete",
-                                         "do",
-                                         "double",
-                                         "dynamic_cast",
-                                         "else",
-                                         "enum",
-                                         "explicit",
-                                         "export",
-                                         "extern",
-                                         "false",
-                                         "float",
-                                         "for",
-                                         "friend",
-                                         "goto",
-                                         "if",
-                                         "inline",
-                                         "int",
-                                         "long",
-                                         "mutable",
-                                         "namespace",
-                                         "new",
-                                         "noexcept",
-                                         "not",
-                                         "not_eq",
-                                         "nullptr",
-                                         "operator",
-                                         "or",
-                                         "or_eq",
-                                         "private",
-                                         "protected",
-                                         "public",
-                                         "register",
-                                         "reinterpret_cast",
-                                         "requires",
-                                         "restrict",
-                                         "return",
-                                         "short",
-                                         "signed",
-                                         "sizeof",
-                                         "static",
-                                         "static_assert",
-                                         "static_cast",
-                                         "struct",
-                                         "switch",
-                                         "template",
-                                         "this",
-                                         "thread_local",
-                                         "throw",
-                                         "true",
-                                         "try",
-                                         "typedef",
-                                         "typeid",
-                                         "typename",
-                                         "union",
-                                         "unsigned",
-                                         "using",
-                                         "virtual",
-                                         "void",
-                                         "volatile",
-                                         "wchar_t",
-                                         "while",
-                                         "xor",
-                                         "xor_eq",
-                                         "main"};
+constexpr std::string_view keywords =
+    " alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t"
+    " char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr"
+    " constinit continue decltype default delete do double dynamic_cast else enum explicit export extern"
+    " false float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr"
+    " operator or or_eq private protected public register reinterpret_cast requires restrict return short"
+    " signed sizeof static static_assert static_cast struct switch template this thread_local throw true"
+    " try typedef typeid typename union unsigned using virtual void volatile wchar_t while xor xor_eq main"
+    " ";
 
 bool letter_or_digit(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -154,7 +69,7 @@ std::string c_identifier(std::string_view name) {
   for (const char c : name) out += letter_or_digit(c) ? c : '_';
   // An identifier that begins with a digit or an underscore is not ours to use.
   const bool free = letter_or_digit(out[0]) && !(out[0] >= '0' && out[0] <= '9') &&
-                    std::find(std::begin(keywords), std::end(keywords), out) == std::end(keywords);
+                    keywords.find(" " + out + " ") == std::string_view::npos;
   return free ? out : "robot_" + out;
 }
 

@@ -124,10 +124,8 @@ bool mapped(const LogMap& map, const std::string& key) {
 /// Seconds where nobody says otherwise. Only numbers have a unit: "Time [UTC]" with times of day needs none.
 Unit unit_of_times(const DelimitedText& table, const LogMap& map, std::size_t column,
                    const UnitSource& declared) {
-  const auto is_number = [column](const TextRow& row) {
-    return parse_number(row.cells[column], '.', unit::si) || parse_number(row.cells[column], ',', unit::si);
-  };
-  if (std::none_of(table.rows.begin(), table.rows.end(), is_number)) return unit::si;
+  const auto counts = [column](const TextRow& row) { return is_number(row.cells[column]); };
+  if (std::none_of(table.rows.begin(), table.rows.end(), counts)) return unit::si;
   const std::string& label = table.header->cells[column];
   const auto in_name = unit_in_name(table.path, table.header->line, label, time_unit_of,
                                     fmt::format("a unit of time ({})", fmt::join(time_unit_names(), ", ")));
@@ -306,14 +304,7 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
       if (out.name.empty())
         throw InputError(path, row.line, table.column_label(*name), "a name", "an empty field");
     }
-    if (time) {
-      const auto stamp = time_stamp(row.cells[*time], time_unit, table.dialect.decimal);
-      if (!stamp) {
-        throw InputError(path, row.line, table.column_label(*time),
-                         "seconds, 12:30:05.25 or 2026-03-01T12:30:05.25", "'" + row.cells[*time] + "'");
-      }
-      out.time = *stamp;
-    }
+    if (time) out.time = table.time(row, *time, row.cells[*time], time_unit);
     for (const std::size_t c : context) out.context.push_back(table.number(row, c, unit::si));
     log.rows.push_back(std::move(out));
   }

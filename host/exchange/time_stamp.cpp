@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "exchange/time_stamp.hpp"
 
-#include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
 #include <cstddef>
+
+#include "exchange/delimited_text.hpp"
 
 namespace flexcomp::host {
 
@@ -84,12 +83,7 @@ std::optional<TimeStamp> time_stamp(std::string_view text, const Unit& unit, cha
     const auto days = std::chrono::sys_days(date).time_since_epoch().count();
     return TimeStamp{static_cast<double>(days) * 86400.0 + *time - offset, clock};
   }
-  std::string number(text);
-  if (decimal == ',') {
-    if (number.find('.') != std::string::npos) return {};
-    std::replace(number.begin(), number.end(), ',', '.');
-  }
-  if (const auto seconds = parse_si(number, unit)) return TimeStamp{*seconds, Clock::count};
+  if (const auto seconds = parse_number(text, decimal, unit)) return TimeStamp{*seconds, Clock::count};
   return {};
 }
 

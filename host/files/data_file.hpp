@@ -4,14 +4,11 @@
 #ifndef FLEXCOMP_HOST_FILES_DATA_FILE_HPP
 #define FLEXCOMP_HOST_FILES_DATA_FILE_HPP
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
-#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "measurement/measured_data.hpp"
+#include "model/targets.hpp"
 
 namespace flexcomp::host {
 
@@ -49,24 +46,6 @@ constexpr const char* point_label = "point";
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns);
 /// Cells of these columns.
 std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row);
-
-/// A target of compensation: joint command or tool pose.
-struct Target {
-  std::size_t line = 0;
-  std::array<double, joint_count> q_rad{};  ///< command; for a pose, the seed that chooses the branch
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();             ///< Ftool in F0, for poses
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< Ftool to F0, for poses
-  Context<double, joint_count> context;
-  std::vector<std::string> extra;
-};
-
-struct TargetsFile {
-  std::string path;
-  bool poses = false;  ///< false: joint commands
-  std::vector<Target> rows;
-  std::vector<std::string> extra;
-  std::vector<std::string> warnings;
-};
 
 /// Reads targets: joint commands, or poses with seeds. Joint commands beyond a limit are accepted: the
 /// controller's status reports them per row.

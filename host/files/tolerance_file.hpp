@@ -4,32 +4,16 @@
 #ifndef FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
 #define FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
 
-#include <cstddef>
 #include <string>
 #include <vector>
 
-#include "model/term_set.hpp"
+#include "model/tolerance.hpp"
 
 namespace flexcomp::host {
-
-/// `expected` ± `sigma` (one standard deviation) of the difference from the nominal robot, in the unit that the
-/// parameter's name ends with.
-struct Tolerance {
-  std::string pattern;  ///< a parameter's name, in which * stands for any text: link*.d_mm
-  double expected = 0;
-  double sigma = 0;
-  std::string file;
-  std::size_t line = 0;
-};
 
 /// Reads a tolerance file: `tolerances:` with, per line, `pattern: sigma` or `pattern: {expected: e, sigma: s}`.
 /// \throws InputError  no such file, no YAML, an unknown key, a sigma that is not above 0
 std::vector<Tolerance> load_tolerances(const std::string& path);
-
-/// Indices of the parameters whose names match the tolerance's pattern.
-/// \throws InputError  with file and line where none matches
-std::vector<std::size_t> parameters_meant(const Tolerance& tolerance,
-                                          const std::vector<Parameter>& parameters);
 
 }  // namespace flexcomp::host
 

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "files/tolerance_file.hpp"
 #include "identification/estimator.hpp"
 #include "identification/frames.hpp"
 #include "identification/parameter_selection.hpp"
@@ -17,6 +16,7 @@
 #include "measurement/repeats.hpp"
 #include "model/calibration.hpp"
 #include "model/paper_model.hpp"
+#include "model/tolerance.hpp"
 
 namespace flexcomp::host {
 

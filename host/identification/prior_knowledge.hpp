@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "files/tolerance_file.hpp"
 #include "model/term_set.hpp"
+#include "model/tolerance.hpp"
 
 namespace flexcomp::host {
 

@@ -8,9 +8,9 @@
 #include <optional>
 #include <vector>
 
-#include "files/data_file.hpp"
 #include "flexcomp/linear.hpp"
 #include "model/robot.hpp"
+#include "model/targets.hpp"
 
 namespace flexcomp::host {
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "files/tolerance_file.hpp"
 #include "identification/residuals.hpp"
 #include "measurement/noise_level.hpp"
 #include "measurement/observation.hpp"
 #include "model/paper_model.hpp"
+#include "model/tolerance.hpp"
 #include "studies/paper.hpp"
 
 namespace flexcomp::host {

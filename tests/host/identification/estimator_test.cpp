@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "files/tolerance_file.hpp"
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
 #include "input_error.hpp"
