@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "diagnosis/diagnose.hpp"
+#include "diagnosis/result.hpp"
 #include "measurement/measured_data.hpp"
 #include "measurement/observation.hpp"
 #include "model/effects.hpp"

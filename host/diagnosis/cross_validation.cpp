@@ -4,6 +4,8 @@
 #include <Eigen/Dense>
 #include <array>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "linalg/blas.hpp"
 #include "linalg/decompositions.hpp"
@@ -12,10 +14,10 @@ namespace flexcomp::host {
 
 namespace {
 
-/// A pose that alone decides a direction (what the others leave free of it, as a share) predicts nothing of itself there.
+/// Least 1 - h, h the leverage of a pose in one direction, at which the other poses predict it there.
 constexpr double decides_alone = 1e-9;
 
-/// Hardly anything: what the model moves has no prior.
+/// Prior precision of the model's own parameters: as good as none.
 constexpr double free_precision = 1e-12;
 
 }  // namespace
@@ -32,19 +34,13 @@ LeftOutPoses::LeftOutPoses(const std::vector<Observation>& rows) {
 double LeftOutPoses::chi2_per_number(const SubsetSearch& search, const Scored& solution) const {
   const GapSystem& system = search.system();
   const Eigen::Index own = system.nuisance.cols();
-  Eigen::Index count = own;
-  for (const std::size_t b : solution.blocks)
-    count += static_cast<Eigen::Index>(system.blocks[b].columns.size());
+  const ChosenColumns added = search.columns_of(solution.blocks);
+  const Eigen::Index count = own + added.columns.cols();
   Eigen::MatrixXd all(system.columns.rows(), count);
   all.leftCols(own) = system.nuisance;
+  all.rightCols(count - own) = added.columns;
   Eigen::VectorXd precision = Eigen::VectorXd::Constant(count, free_precision);
-  Eigen::Index at = own;
-  for (const std::size_t b : solution.blocks) {
-    for (const Eigen::Index c : system.blocks[b].columns) {
-      precision[at] = search.noise_scale2() * search.precision_of(system.blocks[b], c);
-      all.col(at++) = system.columns.col(c);
-    }
-  }
+  precision.tail(count - own) = added.precision;
   Eigen::MatrixXd normal = gram(all);
   normal.diagonal() += precision;
   Eigen::MatrixXd right = all.transpose() * system.residual;
@@ -75,6 +71,38 @@ double LeftOutPoses::chi2_per_number(const SubsetSearch& search, const Scored& s
     }
   }
   return sum / system.numbers;
+}
+
+Scored prune_by_cross_validation(const SubsetSearch& search, const LeftOutPoses& left_out,
+                                 std::size_t most_effects, Scored best) {
+  const std::vector<Block>& blocks = search.system().blocks;
+  // Of a function that block alone, of an effect all its blocks.
+  const auto goes_with = [&](std::size_t b, std::size_t other) {
+    return other == b || (!blocks[b].is_function() && same_name(blocks[other].id, blocks[b].id));
+  };
+  std::vector<bool> allowed(blocks.size(), true);
+  for (std::size_t round = 0; round < 2 * most_effects && !best.blocks.empty(); ++round) {
+    double least = left_out.chi2_per_number(search, best);
+    std::optional<std::size_t> idle;
+    Scored without_it;
+    for (const std::size_t b : best.blocks) {
+      // Of the few poses in a local fault each one left out takes most of it away.
+      if (blocks[b].is_local()) continue;
+      Scored less =
+          search.score(without_if(best.blocks, [&](std::size_t other) { return goes_with(b, other); }));
+      const double chi2 = left_out.chi2_per_number(search, less);
+      if (chi2 > least) continue;
+      least = chi2;
+      idle = b;
+      without_it = std::move(less);
+    }
+    if (!idle) break;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      if (goes_with(*idle, b)) allowed[b] = false;
+    }
+    best = round < most_effects ? search.best(most_effects, {without_it.blocks}, allowed) : without_it;
+  }
+  return best;
 }
 
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What an explanation is worth on poses that it has not seen.
+/// Cross-validation of a solution: prediction of left-out poses in closed form (D12), and removal of what does not help.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_CROSS_VALIDATION_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_CROSS_VALIDATION_HPP
 
@@ -12,19 +12,23 @@
 
 namespace flexcomp::host {
 
-/// Rows by pose: those with the same joint readings are left out together.
+/// Leave-one-pose-out: rows with the same joint readings are left out together.
 class LeftOutPoses {
  public:
   explicit LeftOutPoses(const std::vector<Observation>& rows);
 
-  /// Chi-square per measured number on poses that were left out, one after the other: the model's own parameters and the
-  /// blocks are fitted to all the others (in closed form, the leave-one-out residuals of ridge regression: Allen, PRESS,
-  /// 1974; in blocks Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10).
+  /// Chi-square per measured number on poses that were left out, one after the other (D12): leave-one-out residuals of ridge
+  /// regression (Allen, PRESS, 1974; in blocks Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10).
   double chi2_per_number(const SubsetSearch& search, const Scored& solution) const;
 
  private:
   std::vector<std::vector<std::size_t>> poses_;
 };
+
+/// Removes the effects without which left-out poses are predicted better, one at a time; others may come in their place.
+/// Local faults are excepted.
+Scored prune_by_cross_validation(const SubsetSearch& search, const LeftOutPoses& left_out,
+                                 std::size_t most_effects, Scored best);
 
 }  // namespace flexcomp::host
 

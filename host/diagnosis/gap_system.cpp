@@ -7,17 +7,26 @@
 #include <stdexcept>
 
 #include "linalg/blas.hpp"
-#include "linalg/decompositions.hpp"
-#include "model/place.hpp"
 
 namespace flexcomp::host {
 
 namespace {
 
-/// Less than this share of a column left after the projection: the data cannot speak of it (docs/model.md, M33).
+/// A column is dropped where less than this share of its norm is left after the projection (docs/model.md, M33).
 constexpr double nothing_left = 1e-3;
 
-/// Directions of a block of which something is left (the sum of a curve's splines is the offset of its joint).
+/// Indices of the columns of which enough is left after the projection.
+std::vector<Eigen::Index> identifiable_columns(const Eigen::MatrixXd& columns,
+                                               const Eigen::MatrixXd& projected) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    const double whole = columns.col(c).norm();
+    if (whole > 0 && projected.col(c).norm() > nothing_left * whole) kept.push_back(c);
+  }
+  return kept;
+}
+
+/// Rank of a block after the projection (the sum of a curve's splines is the offset of its joint).
 double rank(const Eigen::MatrixXd& projected, const std::vector<Eigen::Index>& columns,
             const Eigen::Ref<const Eigen::MatrixXd>& whole, const std::vector<Eigen::Index>& whole_index) {
   const Eigen::Index n = static_cast<Eigen::Index>(columns.size());
@@ -27,8 +36,8 @@ double rank(const Eigen::MatrixXd& projected, const std::vector<Eigen::Index>& c
     const Eigen::Index c = columns[static_cast<std::size_t>(k)];
     scaled.col(k) = projected.col(c) / whole.col(whole_index[static_cast<std::size_t>(c)]).norm();
   }
-  return static_cast<double>(
-      (symmetric_eigenvalues(gram(scaled)).array() > nothing_left * nothing_left).count());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram(scaled), Eigen::EigenvaluesOnly);
+  return static_cast<double>((eigen.eigenvalues().array() > nothing_left * nothing_left).count());
 }
 
 std::vector<Place> all_places() {
@@ -51,9 +60,9 @@ Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_r
   return out;
 }
 
-const PlaceColumn& place_column(const GapSystem& system, Place place) {
+const Eigen::VectorXd& place_column(const GapSystem& system, Place place) {
   for (const PlaceColumn& p : system.places) {
-    if (p.place == place) return p;
+    if (p.place == place) return p.column;
   }
   throw std::logic_error("a place without a column");
 }
@@ -62,11 +71,7 @@ void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
   const Eigen::MatrixXd projected =
       columns - product(system.nuisance, transposed_product(system.nuisance, columns));
   const Eigen::Index first = system.columns.cols();
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
-    const double whole = columns.col(c).norm();
-    if (whole > 0 && projected.col(c).norm() > nothing_left * whole) kept.push_back(c);
-  }
+  const std::vector<Eigen::Index> kept = identifiable_columns(columns, projected);
   if (kept.empty()) return;
   system.columns.conservativeResize(columns.rows(), first + static_cast<Eigen::Index>(kept.size()));
   block.columns.clear();
@@ -77,6 +82,50 @@ void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
   }
   system.blocks.push_back(std::move(block));
 }
+
+namespace {
+
+/// Columns of the candidates (whitened), projected (D1) and sorted into blocks, one per form of an effect.
+void add_candidates(GapSystem& system, const CandidateSet& all, const Eigen::MatrixXd& columns) {
+  const Eigen::MatrixXd projected =
+      columns - product(system.nuisance, transposed_product(system.nuisance, columns));
+  // One column per parameter; forms of a name share them.
+  std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
+  const std::vector<Eigen::Index> kept = identifiable_columns(columns, projected);
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    column_of[static_cast<std::size_t>(kept[k])] = static_cast<Eigen::Index>(k);
+  system.columns = projected(Eigen::all, kept);
+  for (std::size_t c = 0; c < all.list.size(); ++c) {
+    const Candidate& candidate = all.list[c];
+    if (candidate.steps) continue;  // a scan makes blocks of it
+    Block block;
+    block.id = candidate.id;
+    block.candidate = c;
+    block.positive = candidate.positive;
+    for (const std::size_t p : candidate.parameters) {
+      if (column_of[p] < 0) continue;
+      block.columns.push_back(column_of[p]);
+      block.fitted.push_back(p);
+    }
+    if (block.columns.empty()) {
+      const bool known = std::any_of(system.dropped.begin(), system.dropped.end(),
+                                     [&](const EffectId& id) { return same_name(id, candidate.id); });
+      if (!known) system.dropped.push_back(candidate.id);
+      continue;
+    }
+    block.parameters = rank(system.columns, block.columns, columns, kept);
+    // Every arm bends: what the paper's model has needs no more than its BIC.
+    const bool usual = block.id.effect == Effect::joint_compliance || block.id.effect == Effect::link_gravity;
+    block.margin = usual ? 0 : least_gain;
+    if (candidate.prior_rad > 0) {
+      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
+      block.parameters = 0;
+    }
+    system.blocks.push_back(std::move(block));
+  }
+}
+
+}  // namespace
 
 GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
                      const std::vector<bool>& counts, const Estimate& estimate, const Unknowns& fitted,
@@ -100,17 +149,17 @@ GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
   const auto model = prepare(with_places.set, robot, "diagnosis");
   Linearised lin = linearised(with_places, *model, rows, everything);
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const Eigen::Index at = 6 * static_cast<Eigen::Index>(k);
     if (counts[k]) {
       out.numbers += rows[k].has_orientation ? 6 : 3;
       continue;
     }
-    lin.residual.segment<6>(at).setZero();
-    lin.derivative.middleRows<6>(at).setZero();
+    lin.residual.segment<6>(first_number(k)).setZero();
+    lin.derivative.middleRows<6>(first_number(k)).setZero();
   }
   const Eigen::Index moved = static_cast<Eigen::Index>(fitted.count());
   const Eigen::Index asked = static_cast<Eigen::Index>(all.parameters.size());
-  out.nuisance = orthonormal_basis(lin.derivative.leftCols(moved));
+  out.nuisance = Eigen::HouseholderQR<Eigen::MatrixXd>(lin.derivative.leftCols(moved)).householderQ() *
+                 Eigen::MatrixXd::Identity(lin.derivative.rows(), moved);
   const Eigen::VectorXd units = units_of(everything, with_places.set);
   for (std::size_t p = 0; p < places.size(); ++p) {
     const Eigen::Index c = moved + asked + static_cast<Eigen::Index>(p);
@@ -123,48 +172,7 @@ GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
     if (value != 0) out.residual += candidate_columns.col(p) * (value / units[moved + p]);
   }
   out.residual -= out.nuisance * (out.nuisance.transpose() * out.residual);
-
-  const Eigen::MatrixXd projected =
-      candidate_columns - product(out.nuisance, transposed_product(out.nuisance, candidate_columns));
-  // One column per parameter; forms of a name share them.
-  std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index p = 0; p < asked; ++p) {
-    const double whole = candidate_columns.col(p).norm();
-    if (!(whole > 0) || !(projected.col(p).norm() > nothing_left * whole)) continue;
-    column_of[static_cast<std::size_t>(p)] = static_cast<Eigen::Index>(kept.size());
-    kept.push_back(p);
-  }
-  out.columns.resize(projected.rows(), static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    out.columns.col(static_cast<Eigen::Index>(k)) = projected.col(kept[k]);
-  for (std::size_t c = 0; c < all.list.size(); ++c) {
-    const Candidate& candidate = all.list[c];
-    if (candidate.steps) continue;  // a scan makes blocks of it
-    Block block;
-    block.id = candidate.id;
-    block.candidate = c;
-    block.positive = candidate.positive;
-    for (const std::size_t p : candidate.parameters) {
-      if (column_of[p] < 0) continue;
-      block.columns.push_back(column_of[p]);
-      block.fitted.push_back(p);
-    }
-    if (block.columns.empty()) {
-      const bool known = std::any_of(out.dropped.begin(), out.dropped.end(),
-                                     [&](const EffectId& id) { return same_name(id, candidate.id); });
-      if (!known) out.dropped.push_back(candidate.id);
-      continue;
-    }
-    block.parameters = rank(out.columns, block.columns, candidate_columns, kept);
-    // Every arm bends: what the paper's model has needs no more than its BIC.
-    block.margin = descriptor(block.id.effect).in_paper_model ? 0 : least_gain;
-    if (candidate.prior_rad > 0) {
-      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
-      block.parameters = 0;
-    }
-    out.blocks.push_back(std::move(block));
-  }
+  add_candidates(out, all, candidate_columns);
   return out;
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/diagnose.hpp"
+#include "diagnosis/result.hpp"
 #include "measurement/measured_data.hpp"
 
 namespace flexcomp::host {

@@ -1,31 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The whole model with what was found, fitted anew: nothing is frozen.
+/// Refit of the nonlinear model with the selected hypotheses: nothing is fixed (docs/model.md, M34 to M40).
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
 
 #include <vector>
 
-#include "diagnosis/effect_search.hpp"
+#include "diagnosis/fitted_model.hpp"
+#include "diagnosis/hypothesis.hpp"
 #include "identification/estimator.hpp"
 #include "model/calibration.hpp"
 
 namespace flexcomp::host {
 
-struct Refit {
-  Fit fit;  ///< of the start's parameters and the effects'
-  Unknowns fitted;
+/// The start's parameters and the effects'.
+struct Refit : FittedModel {
   Calibration calibration;
-  std::size_t start_terms = 0;  ///< the first so many terms of the set are the start's
 };
 
-Refit refit_with(const Robot& robot, const std::vector<Observation>& rows, const Estimate& start,
-                 const Unknowns& fitted, const Explanation& found);
-
-/// Coefficients, and how far the effect moves the measured point beyond what the model's other parts would take up.
-/// \param nuisance  orthonormal basis of these, whitened as the rows are
-void describe(FoundEffect& effect, const Refit& refit, const Robot& robot,
-              const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance);
+/// Fits the start's parameters and those of the hypotheses. Curves get a prior of their own size (empirical Bayes, D16);
+/// unnamed functions enter as fixed tables.
+Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, const FittedModel& start,
+                  const SearchResult& found);
 
 }  // namespace flexcomp::host
 

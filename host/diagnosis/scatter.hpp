@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Places of the chain that move from pose to pose and follow nothing that was recorded: play whose direction nobody wrote
-/// down, joints that were read too early, a screw that is loose.
+/// Variance components of places (D15): places that move from pose to pose and follow nothing that was recorded, as play
+/// without its direction, joints that were read too early, a loose screw.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_SCATTER_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_SCATTER_HPP
 
 #include <vector>
 
+#include "diagnosis/fitted_model.hpp"
 #include "identification/estimator.hpp"
 #include "measurement/observation.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {
 
-/// A place that takes another value at every pose, as if drawn from a normal distribution.
+/// A place whose value is drawn from a normal distribution at every pose.
 struct Scatter {
   Place place;
   double sigma = 0;  ///< rad or m
@@ -21,7 +22,7 @@ struct Scatter {
   double gain = 0;
 };
 
-/// A model whose noise is the declared one and the scatter of these places besides.
+/// A model whose noise is the declared one plus the scatter of these places.
 struct ScatteredModel {
   std::vector<Scatter> places;    ///< largest gain first; empty: nothing scatters
   std::vector<Observation> rows;  ///< with the wider noise in their whitening
@@ -29,11 +30,9 @@ struct ScatteredModel {
   Fit fit;                        ///< to these rows
 };
 
-/// Maximum likelihood, place after place, in turns with the parameters.
-/// \param fitted  what the rows move, beginning at `start`; rows of `weight` below 1 do not speak of the scatter
+/// Maximum likelihood, place after place, in turns with the parameters. Down-weighted rows do not count for the scatter.
 ScatteredModel scattered_model(const Robot& robot, const std::vector<Observation>& rows,
-                               const Estimate& start, const Unknowns& fitted,
-                               const std::vector<double>& weight);
+                               const FittedModel& start);
 
 }  // namespace flexcomp::host
 

@@ -13,28 +13,45 @@ namespace {
 
 constexpr double minus_infinity = -std::numeric_limits<double>::infinity();
 
-/// Coefficients without a prior are at most some hundred of their usual sizes (precision per square unit), and never
-/// closer to free than this share of their own information: directions that the columns of a set leave open (the sum of
-/// a curve's splines, an axis that wobbles once a turn on a base that tilts) stay where they do no harm.
+/// Weak prior precision (per square unit: some hundred usual sizes), and its least share of a column's own information.
+/// It bounds directions that a subset leaves undetermined: the sum of a curve's splines, an axis wobble on a tilted base.
 constexpr double hardly_bound = 1e-4;
 constexpr double nearly_free = 1e-8;
 
-/// What is left of a column after the others, by which it counts as theirs (squared share).
+/// Squared share of a column outside the span of others below which it counts as spanned by them.
 constexpr double spanned = 1e-6;
 
-/// Would the function's own members say the same?
+bool follows_own_reading(Effect e) {
+  return e == Effect::gear_harmonic || e == Effect::encoder_scale || e == Effect::joint_curve;
+}
+
+/// The Occam factor of the evidence (D3): -ln of the block's part of the determinant, from `from` on in the Cholesky factor.
+void subtract_evidence_cost(double& gain, const Block& block, const Eigen::MatrixXd& factor,
+                            Eigen::Index from) {
+  if (!(block.precision > 0)) return;
+  for (Eigen::Index k = from; k < from + static_cast<Eigen::Index>(block.columns.size()); ++k)
+    gain -= std::log(std::pow(factor(k, k), 2) / block.precision);
+}
+
+/// Whether the function's members span the effect.
 bool is_part_of(const Block& function, const EffectId& id) {
   if (id.joint != function.function_joint) return false;
   const auto follows = [&](unsigned joint) {
     return std::find(function.function_readings.begin(), function.function_readings.end(), joint) !=
            function.function_readings.end();
   };
-  const EffectDescriptor& d = descriptor(id.effect);
-  if (d.in_paper_model || d.place(id) != Place{static_cast<std::uint8_t>(id.joint), slot::theta})
-    return false;
-  const Follows of = d.follows(id);
-  if (of.covariate == Covariate::payload) return function.function_load;
-  return of.covariate == Covariate::joint_position && follows(of.joint[0]);
+  switch (id.effect) {
+    case Effect::gear_harmonic:
+    case Effect::encoder_scale:
+    case Effect::joint_curve:
+      return follows(id.joint);
+    case Effect::joint_coupling:
+      return follows(id.from);
+    case Effect::nonlinear_compliance:
+      return function.function_load;
+    default:
+      return false;
+  }
 }
 
 }  // namespace
@@ -75,169 +92,139 @@ bool SubsetSearch::compatible(std::size_t a, std::size_t b) const {
   for (const auto& [f, other] : {std::pair{&system_.blocks[a], &y}, std::pair{&system_.blocks[b], &x}}) {
     if (f->function_joint != 0 && is_part_of(*f, *other)) return false;
   }
-  const EffectDescriptor& d = descriptor(x.effect);
-  if (x.effect == y.effect && d.has(Selector::after)) return std::abs(x.after_s - y.after_s) > 0;
+  if (x.effect == Effect::reflector_slip && y.effect == Effect::reflector_slip)
+    return std::abs(x.after_s - y.after_s) > 0;
   if (same_name(x, y)) {
     // Several local faults of one joint make one curve.
-    return system_.blocks[a].width_rad > 0 && system_.blocks[b].width_rad > 0 &&
+    return x.effect == Effect::joint_curve && system_.blocks[a].width_rad > 0 &&
+           system_.blocks[b].width_rad > 0 &&
            std::abs(std::remainder(system_.blocks[a].centre_rad - system_.blocks[b].centre_rad, 2 * pi)) >
                system_.blocks[a].width_rad + system_.blocks[b].width_rad;
   }
-  if (x.effect == y.effect && d.all_links_by_default && (x.link == 0 || y.link == 0)) return false;
-  if (x.joint == y.joint && follows_own_joint(x) && follows_own_joint(y)) {
-    const auto is_smooth_curve = [&](std::size_t block) {
-      return descriptor(system_.blocks[block].id.effect).table == TableKind::curve &&
-             system_.blocks[block].width_rad == 0;
-    };
-    return !is_smooth_curve(a) && !is_smooth_curve(b);  // the smooth curve contains the other
+  if (x.effect == Effect::thermal_growth && y.effect == Effect::thermal_growth &&
+      (x.link == 0 || y.link == 0))
+    return false;
+  if (x.joint == y.joint && follows_own_reading(x.effect) && follows_own_reading(y.effect)) {
+    const bool curve_x = x.effect == Effect::joint_curve && system_.blocks[a].width_rad == 0;
+    const bool curve_y = y.effect == Effect::joint_curve && system_.blocks[b].width_rad == 0;
+    return !curve_x && !curve_y;  // the smooth curve contains the other
   }
   return true;
 }
 
+SubsetSearch::Selected SubsetSearch::selected(const Subset& subset) const {
+  std::vector<double> precision;
+  Selected out;
+  for (const std::size_t b : subset) {
+    for (const Eigen::Index c : system_.blocks[b].columns) {
+      out.index.push_back(c);
+      precision.push_back(precision_of(system_.blocks[b], c));
+    }
+  }
+  out.precision =
+      Eigen::Map<const Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
+  return out;
+}
+
+ChosenColumns SubsetSearch::columns_of(const Subset& subset) const {
+  const Selected s = selected(subset);
+  return {system_.columns(Eigen::all, s.index), scale2_ * s.precision};
+}
+
+Eigen::MatrixXd SubsetSearch::normal_matrix(const Selected& s) const {
+  Eigen::MatrixXd normal = gram_(s.index, s.index);
+  normal.diagonal() += s.precision;
+  return normal;
+}
+
 Scored SubsetSearch::score(const Subset& subset) const {
   Scored out;
-  out.blocks = subset;
-  std::vector<Eigen::Index> index;
-  Eigen::VectorXd prior;
   // Blocks with a prior come last: the factor's diagonal is then that of their Schur complement.
-  Subset ordered = subset;
-  std::stable_sort(ordered.begin(), ordered.end(), [&](std::size_t a, std::size_t b) {
+  out.blocks = subset;
+  std::stable_sort(out.blocks.begin(), out.blocks.end(), [&](std::size_t a, std::size_t b) {
     return (system_.blocks[a].precision > 0) < (system_.blocks[b].precision > 0);
   });
-  out.blocks = ordered;
-  for (const std::size_t b : ordered)
-    index.insert(index.end(), system_.blocks[b].columns.begin(), system_.blocks[b].columns.end());
-  const Eigen::Index n = static_cast<Eigen::Index>(index.size());
-  Eigen::MatrixXd normal(n, n);
-  Eigen::VectorXd right(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    right[i] = product_[index[static_cast<std::size_t>(i)]];
-    for (Eigen::Index k = 0; k <= i; ++k)
-      normal(i, k) = normal(k, i) =
-          gram_(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(k)]);
-  }
-  prior.resize(n);
-  Eigen::Index at = 0;
-  for (const std::size_t b : ordered) {
-    for (const Eigen::Index c : system_.blocks[b].columns) prior[at++] = precision_of(system_.blocks[b], c);
-  }
-  normal.diagonal() += prior;
-  if (!factor_in_place(normal)) {
-    out.gain = minus_infinity;
-    return out;
-  }
+  const Selected s = selected(out.blocks);
+  const Eigen::VectorXd right = product_(s.index);
+  Eigen::MatrixXd normal = normal_matrix(s);
+  out.gain = minus_infinity;
+  if (!factor_in_place(normal)) return out;
   Eigen::MatrixXd solved = right;
   solve_lower(normal, solved);
   solve_lower_transposed(normal, solved);
   out.solution = solved.col(0);
   out.chi2_gain = out.solution.dot(right);
   // More than there is: the columns are one another's to rounding.
-  if (!(out.chi2_gain <= total_)) {
-    out.gain = minus_infinity;
-    return out;
-  }
+  if (!(out.chi2_gain <= total_)) return out;
   out.gain = out.chi2_gain;
-  at = 0;
-  for (const std::size_t b : ordered) {
+  Eigen::Index at = 0;
+  for (const std::size_t b : out.blocks) {
     const Block& block = system_.blocks[b];
     const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
-    if (block.precision > 0) {
-      for (Eigen::Index k = at; k < at + size; ++k)
-        out.gain -= std::log(std::pow(normal(k, k), 2) / block.precision);
-    }
+    subtract_evidence_cost(out.gain, block, normal, at);
     // A scan has looked at many positions of a function with few numbers: they count besides the evidence.
     out.gain -= block.parameters * log_n_;
     out.parameters += block.parameters;
-    if (block.positive) {
-      for (Eigen::Index k = at; k < at + size; ++k) {
-        if (out.solution[k] < 0) out.gain = minus_infinity;
-      }
-    }
+    if (block.positive && (out.solution.segment(at, size).array() < 0).any()) out.gain = minus_infinity;
     at += size;
   }
   return out;
 }
 
 std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
-  std::vector<Eigen::Index> index;
-  std::vector<double> prior;
-  for (const std::size_t b : subset) {
-    for (const Eigen::Index c : system_.blocks[b].columns) {
-      index.push_back(c);
-      prior.push_back(precision_of(system_.blocks[b], c));
-    }
-  }
-  const Eigen::Index n = static_cast<Eigen::Index>(index.size());
-  Eigen::MatrixXd reduced(n, gram_.cols());  // L^-1 G[S, :]
-  Eigen::MatrixXd done = Eigen::MatrixXd::Zero(n, 1);
-  if (n > 0) {
-    Eigen::MatrixXd normal(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      reduced.row(i) = gram_.row(index[static_cast<std::size_t>(i)]);
-      done(i, 0) = product_[index[static_cast<std::size_t>(i)]];
-      for (Eigen::Index k = 0; k < n; ++k)
-        normal(i, k) = gram_(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(k)]);
-      normal(i, i) += prior[static_cast<std::size_t>(i)];
-    }
+  const Selected s = selected(subset);
+  Eigen::MatrixXd reduced = gram_(s.index, Eigen::all);  // L^-1 G[S, :]
+  Eigen::MatrixXd done = product_(s.index);
+  if (!s.index.empty()) {
+    Eigen::MatrixXd normal = normal_matrix(s);
     if (!factor_in_place(normal)) return std::vector<double>(system_.blocks.size(), minus_infinity);
     solve_lower(normal, reduced);
     solve_lower(normal, done);
   }
   std::vector<double> gains(system_.blocks.size(), minus_infinity);
   for (std::size_t b = 0; b < system_.blocks.size(); ++b) {
-    const Block& block = system_.blocks[b];
-    if (std::any_of(subset.begin(), subset.end(), [&](std::size_t s) { return s == b || !compatible(s, b); }))
+    if (std::any_of(subset.begin(), subset.end(), [&](std::size_t o) { return o == b || !compatible(o, b); }))
       continue;
-    const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
-    Eigen::MatrixXd normal(size, size);
-    Eigen::VectorXd right(size);
-    Eigen::MatrixXd taken(n, size);
-    for (Eigen::Index i = 0; i < size; ++i)
-      taken.col(i) = reduced.col(block.columns[static_cast<std::size_t>(i)]);
-    const Eigen::MatrixXd carried = gram(taken);
-    bool is_spanned = false;
-    for (Eigen::Index i = 0; i < size; ++i) {
-      const Eigen::Index ci = block.columns[static_cast<std::size_t>(i)];
-      right[i] = product_[ci] - (n > 0 ? taken.col(i).dot(done.col(0)) : 0);
-      for (Eigen::Index k = 0; k < size; ++k)
-        normal(i, k) = gram_(ci, block.columns[static_cast<std::size_t>(k)]) - carried(i, k);
-      if (normal(i, i) < spanned * gram_(ci, ci) && size == 1) is_spanned = true;
-      normal(i, i) += precision_of(block, ci);
-    }
-    if (is_spanned) continue;
-    if (!factor_in_place(normal)) continue;
-    Eigen::MatrixXd solution = right;
-    solve_lower(normal, solution);
-    double gain = solution.squaredNorm();
-    solve_lower_transposed(normal, solution);
-    if (block.positive && (solution.array() < 0).any()) continue;
-    if (block.precision > 0) {
-      for (Eigen::Index k = 0; k < size; ++k) gain -= std::log(std::pow(normal(k, k), 2) / block.precision);
-    }
-    gains[b] = gain - block.parameters * log_n_;
+    gains[b] = gain_of_adding(system_.blocks[b], reduced, done);
   }
   return gains;
 }
 
+double SubsetSearch::gain_of_adding(const Block& block, const Eigen::MatrixXd& reduced,
+                                    const Eigen::MatrixXd& done) const {
+  const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
+  const Eigen::MatrixXd taken = reduced(Eigen::all, block.columns);
+  const Eigen::MatrixXd absorbed = gram(taken);
+  Eigen::MatrixXd normal(size, size);
+  Eigen::VectorXd right(size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const Eigen::Index ci = block.columns[static_cast<std::size_t>(i)];
+    right[i] = product_[ci] - (reduced.rows() > 0 ? taken.col(i).dot(done.col(0)) : 0);
+    for (Eigen::Index k = 0; k < size; ++k)
+      normal(i, k) = gram_(ci, block.columns[static_cast<std::size_t>(k)]) - absorbed(i, k);
+    if (normal(i, i) < spanned * gram_(ci, ci) && size == 1) return minus_infinity;
+    normal(i, i) += precision_of(block, ci);
+  }
+  if (!factor_in_place(normal)) return minus_infinity;
+  Eigen::MatrixXd solution = right;
+  solve_lower(normal, solution);
+  double gain = solution.squaredNorm();
+  solve_lower_transposed(normal, solution);
+  if (block.positive && (solution.array() < 0).any()) return minus_infinity;
+  subtract_evidence_cost(gain, block, normal, 0);
+  return gain - block.parameters * log_n_;
+}
+
 std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& others,
                                                                 std::size_t block) const {
-  std::vector<Eigen::Index> index;
-  std::vector<double> prior;
-  for (const std::size_t b : others) {
-    for (const Eigen::Index c : system_.blocks[b].columns) {
-      index.push_back(c);
-      prior.push_back(precision_of(system_.blocks[b], c));
-    }
-  }
+  const Selected s = selected(others);
   const std::vector<Eigen::Index>& own = system_.blocks[block].columns;
   Eigen::MatrixXd information = gram_(own, own);
   Eigen::VectorXd right = product_(own);
-  if (index.empty()) return {information, right};
-  Eigen::MatrixXd normal = gram_(index, index);
-  normal.diagonal() +=
-      Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
-  Eigen::MatrixXd across = gram_(index, own);
-  Eigen::MatrixXd done = product_(index);
+  if (s.index.empty()) return {information, right};
+  Eigen::MatrixXd normal = normal_matrix(s);
+  Eigen::MatrixXd across = gram_(s.index, own);
+  Eigen::MatrixXd done = product_(s.index);
   if (!factor_in_place(normal)) return {information, right};
   solve_lower(normal, across);
   solve_lower(normal, done);
@@ -248,8 +235,12 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> SubsetSearch::given(const Subset& ot
 
 Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts,
                           const std::vector<bool>& allowed) const {
+  return with_exchanges(beam_search(largest, starts, allowed), allowed);
+}
+
+Scored SubsetSearch::beam_search(std::size_t largest, const std::vector<Subset>& starts,
+                                 const std::vector<bool>& allowed) const {
   constexpr std::size_t beam = 4;
-  const auto may = [&](std::size_t b) { return allowed.empty() || allowed[b]; };
   std::vector<Subset> front{Subset()};
   front.insert(front.end(), starts.begin(), starts.end());
   Scored best = score(Subset());
@@ -260,16 +251,14 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
   std::set<Subset> seen;
   int idle = 0;
   for (std::size_t depth = 0; depth < largest && idle < 2; ++depth) {
-    front.erase(
-        std::remove_if(front.begin(), front.end(), [&](const Subset& s) { return s.size() >= largest; }),
-        front.end());
+    std::erase_if(front, [&](const Subset& s) { return s.size() >= largest; });
     std::vector<std::pair<double, Subset>> next;
     for (const Subset& s : front) {
       const double here = score(s).gain;
       const std::vector<double> gains = extensions(s);
       std::vector<std::size_t> order;
       for (std::size_t b = 0; b < gains.size(); ++b) {
-        if (gains[b] > minus_infinity && may(b)) order.push_back(b);
+        if (gains[b] > minus_infinity && (allowed.empty() || allowed[b])) order.push_back(b);
       }
       const std::size_t few = std::min<std::size_t>(order.size(), 2 * beam);
       std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(few), order.end(),
@@ -298,19 +287,22 @@ Scored SubsetSearch::best(std::size_t largest, const std::vector<Subset>& starts
     idle = better ? 0 : idle + 1;
     if (front.empty()) break;
   }
-  // Exchanges and removals.
+  return best;
+}
+
+Scored SubsetSearch::with_exchanges(Scored best, const std::vector<bool>& allowed) const {
   for (int round = 0; round < 20; ++round) {
     Scored better = best;
     for (std::size_t k = 0; k < best.blocks.size(); ++k) {
-      Subset without = best.blocks;
-      without.erase(without.begin() + static_cast<std::ptrdiff_t>(k));
-      const Scored removed = score(without);
+      const Subset rest = without(best.blocks, best.blocks[k]);
+      const Scored removed = score(rest);
       if (value(removed) > value(better)) better = removed;
-      const std::vector<double> gains = extensions(without);
+      const std::vector<double> gains = extensions(rest);
       for (std::size_t b = 0; b < gains.size(); ++b) {
-        Subset exchanged = without;
+        if (!allowed.empty() && !allowed[b]) continue;
+        Subset exchanged = rest;
         exchanged.push_back(b);
-        if (!may(b) || !(removed.gain + gains[b] - margins(exchanged) > value(better))) continue;
+        if (!(removed.gain + gains[b] - margins(exchanged) > value(better))) continue;
         const Scored scored = score(exchanged);
         if (value(scored) > value(better) + 1e-9) better = scored;
       }
@@ -326,24 +318,17 @@ Eigen::VectorXd SubsetSearch::largest_single_gains(const Eigen::MatrixXd& residu
   Eigen::VectorXd largest = Eigen::VectorXd::Constant(residuals.cols(), minus_infinity);
   for (const Block& block : system_.blocks) {
     const Eigen::Index size = static_cast<Eigen::Index>(block.columns.size());
-    Eigen::MatrixXd normal(size, size);
-    Eigen::MatrixXd right(size, residuals.cols());
-    for (Eigen::Index i = 0; i < size; ++i) {
-      right.row(i) = products.row(block.columns[static_cast<std::size_t>(i)]);
-      for (Eigen::Index k = 0; k < size; ++k)
-        normal(i, k) =
-            gram_(block.columns[static_cast<std::size_t>(i)], block.columns[static_cast<std::size_t>(k)]);
+    Eigen::MatrixXd normal = gram_(block.columns, block.columns);
+    for (Eigen::Index i = 0; i < size; ++i)
       normal(i, i) += precision_of(block, block.columns[static_cast<std::size_t>(i)]);
-    }
     if (!factor_in_place(normal)) continue;
-    double cost = block.parameters * log_n_;
-    if (block.precision > 0) {
-      for (Eigen::Index k = 0; k < size; ++k) cost += std::log(std::pow(normal(k, k), 2) / block.precision);
-    }
+    double minus_cost = -(block.parameters * log_n_);
+    subtract_evidence_cost(minus_cost, block, normal, 0);
+    Eigen::MatrixXd right = products(block.columns, Eigen::all);
     solve_lower(normal, right);
     for (Eigen::Index c = 0; c < right.cols(); ++c) {
       if (block.positive && size == 1 && right(0, c) < 0) continue;
-      largest[c] = std::max(largest[c], right.col(c).squaredNorm() - cost);
+      largest[c] = std::max(largest[c], right.col(c).squaredNorm() + minus_cost);
     }
   }
   return largest;

@@ -357,4 +357,18 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
   return out;
 }
 
+std::vector<bool> Fit::has_full_weight(std::size_t rows) const {
+  std::vector<bool> out(rows, true);
+  for (const std::size_t k : outliers()) out[k] = false;
+  return out;
+}
+
+std::vector<std::size_t> Fit::outliers() const {
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    if (weight[k] < 1) out.push_back(k);
+  }
+  return out;
+}
+
 }  // namespace flexcomp::host

@@ -54,4 +54,8 @@ Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Rob
   return out;
 }
 
+Estimate estimate_of(const Calibration& calibration) {
+  return {calibration.terms, calibration.f(), calibration.e()};
+}
+
 }  // namespace flexcomp::host

@@ -15,6 +15,9 @@ namespace flexcomp::host {
 /// the robot's name and hash. Terms that were neither fitted nor given (coefficient zero) are left out.
 Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot);
 
+/// The terms and frames of a calibration, as a fit starts from.
+Estimate estimate_of(const Calibration& calibration);
+
 }  // namespace flexcomp::host
 
 #endif

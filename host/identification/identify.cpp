@@ -175,16 +175,13 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
     out.o1 = std::exp(s.array().log().mean()) / std::sqrt(static_cast<double>(rows.size()));
   }
 
-  const auto model = prepare(out.fit.estimate.set, robot, source);
-  out.residuals = residuals(out.fit.estimate, *model, rows);
+  out.residuals = residuals(out.fit.estimate, robot, rows, source);
   out.after = statistics(out.residuals, rows);
+  out.outliers = out.fit.outliers();
   std::vector<Observation> inliers;
-  for (std::size_t k = 0; k < out.fit.weight.size(); ++k) {
-    if (out.fit.weight[k] < 1) {
-      out.outliers.push_back(k);
-    } else {
-      inliers.push_back(rows[k]);
-    }
+  const std::vector<bool> counts = out.fit.has_full_weight(rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (counts[k]) inliers.push_back(rows[k]);
   }
   if (fitted.count() > 0) out.pure_error = pure_error(inliers, out.fit.chi2, out.fit.degrees_of_freedom);
 

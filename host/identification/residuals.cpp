@@ -83,6 +83,18 @@ std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& mo
   return out;
 }
 
+std::vector<RowResidual> residuals(const Estimate& estimate, const Robot& robot,
+                                   const std::vector<Observation>& rows, const std::string& source) {
+  return residuals(estimate, *prepare(estimate.set, robot, source), rows);
+}
+
+Eigen::VectorXd whitened(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows) {
+  Eigen::VectorXd out(6 * static_cast<Eigen::Index>(residuals.size()));
+  for (std::size_t k = 0; k < residuals.size(); ++k)
+    out.segment<6>(6 * static_cast<Eigen::Index>(k)) = whitened(rows[k], residuals[k]);
+  return out;
+}
+
 namespace {
 
 /// Derivative of a table term for one value of its table: spline weight (M6) or bilinear weight (M7), times the factor.

@@ -55,6 +55,11 @@ Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whiten
 /// Residuals of all rows, in their order, Eq. (M31).
 std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows);
+/// The same of a model that is prepared for them. \param source  names the terms in messages
+std::vector<RowResidual> residuals(const Estimate& estimate, const Robot& robot,
+                                   const std::vector<Observation>& rows, const std::string& source);
+/// All rows stacked, six numbers each, whitened.
+Eigen::VectorXd whitened(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows);
 
 /// Whitened residuals and minus their derivative, Eq. (M32): residual(x + dx) = residual - derivative * dx to
 /// first order, each row block six high (three of them zero for positions). Columns are scaled by unit_of(): dx

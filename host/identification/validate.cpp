@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
+#include "identification/fitted_calibration.hpp"
 #include "input_error.hpp"
 #include "linalg/decompositions.hpp"
 
@@ -45,28 +46,18 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
   return lin.residual.squaredNorm() - ar.dot(Llt(inner).solve(ar));
 }
 
-Estimate estimate_of(const Calibration& calibration) {
-  Estimate estimate;
-  estimate.set = calibration.terms;
-  estimate.f = calibration.f();
-  estimate.e = calibration.e();
-  return estimate;
-}
-
 }  // namespace
 
 std::vector<RowResidual> residuals_with(const Robot& robot, const Calibration& calibration,
                                         const std::vector<Observation>& rows) {
-  const auto model = prepare(calibration.terms, robot, calibration.path);
-  return residuals(estimate_of(calibration), *model, rows);
+  return residuals(estimate_of(calibration), robot, rows, calibration.path);
 }
 
 ErrorStatistics errors_of_corrected(const Robot& robot, const Calibration& calibration,
                                     const std::vector<Observation>& rows) {
-  const auto nominal = prepare(TermSet(), robot, robot.path);
   Estimate frames = estimate_of(calibration);
   frames.set = TermSet();
-  return statistics(residuals(frames, *nominal, rows), rows);
+  return statistics(residuals(frames, robot, rows, robot.path), rows);
 }
 
 Validation validate(const Robot& robot, const Calibration& calibration, const std::vector<Observation>& rows,
@@ -75,8 +66,7 @@ Validation validate(const Robot& robot, const Calibration& calibration, const st
   Estimate fitted;
   out.before = errors_before(robot, rows, &fitted);
   if (!calibration.frames) fitted = Estimate();
-  const auto nominal = prepare(TermSet(), robot, robot.path);
-  out.nominal = residuals(fitted, *nominal, rows);
+  out.nominal = residuals(fitted, robot, rows, robot.path);
 
   const Estimate estimate = estimate_of(calibration);
   const auto model = prepare(estimate.set, robot, calibration.path);

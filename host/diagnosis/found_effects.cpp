@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diagnosis/found_effects.hpp"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+namespace flexcomp::host {
+
+namespace {
+
+/// Coefficients, and how far the effect moves the measured point beyond what the model's other parts would absorb.
+/// \param nuisance  orthonormal basis of these, whitened as the rows are
+void describe(FoundEffect& effect, const Refit& refit, const Robot& robot,
+              const std::vector<Observation>& rows, const Eigen::MatrixXd& nuisance) {
+  const TermSet& set = refit.fit.estimate.set;
+  for (EffectGroup& group : effects_of(set, robot.nominal)) {
+    if (!same_name(group.id, effect.id)) continue;
+    effect.id = group.id;
+    Estimate without = refit.fit.estimate;
+    for (const Parameter& p : group.parameters) {
+      EffectCoefficient c;
+      c.key = p.name.substr(p.name.rfind('.') + 1);
+      c.unit = p.unit;
+      c.value = p.get(set);
+      c.sigma = std::nan("");
+      for (std::size_t k = 0; k < refit.fitted.parameters.size(); ++k) {
+        if (refit.fitted.parameters[k].name != p.name) continue;
+        const Eigen::Index i = static_cast<Eigen::Index>(refit.fitted.frames.size() + k);
+        c.sigma = std::sqrt(std::max(0.0, refit.fit.covariance(i, i))) * unit_of(p, set);
+      }
+      effect.coefficients.push_back(c);
+      p.set(without.set, 0);
+    }
+    const std::vector<RowResidual> a = residuals(refit.fit.estimate, robot, rows, "diagnosis");
+    std::vector<RowResidual> shift = residuals(without, robot, rows, "diagnosis");
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      shift[k].position_m = a[k].position_m - shift[k].position_m;
+      shift[k].orientation_rad = a[k].orientation_rad - shift[k].orientation_rad;
+    }
+    Eigen::VectorXd column = whitened(shift, rows);
+    // What geometry and frames would take up is theirs: an axis that tilts once a turn is largely a tilted base.
+    column -= nuisance * (nuisance.transpose() * column);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double moved = unwhitened(rows[k], column.segment<6>(first_number(k))).head<3>().norm();
+      effect.largest_m = std::max(effect.largest_m, moved);
+      effect.rms_m += moved * moved / static_cast<double>(rows.size());
+    }
+    effect.rms_m = std::sqrt(effect.rms_m);
+    return;
+  }
+}
+
+/// Other effects that could stand for `id`, within decisive_bic of it. \param without  the solution without its blocks
+std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution, const Subset& without,
+                             const EffectId& id) {
+  std::vector<Rival> rivals;
+  const GapSystem& system = search.system();
+  const double base = search.score(without).gain;
+  const std::vector<double> gains = search.extensions(without);
+  for (std::size_t b = 0; b < gains.size(); ++b) {
+    const Block& block = system.blocks[b];
+    if (same_name(block.id, id) || block.is_function()) continue;
+    const double delta = solution.gain - (base + gains[b]);
+    // A rival is better than nothing.
+    if (!(delta < decisive_bic) || !(gains[b] > 0)) continue;
+    const auto known =
+        std::find_if(rivals.begin(), rivals.end(), [&](const Rival& r) { return same_name(r.id, block.id); });
+    if (known == rivals.end()) {
+      rivals.push_back({block.id, delta});
+    } else if (delta < known->delta_bic) {
+      *known = {block.id, delta};
+    }
+  }
+  std::sort(rivals.begin(), rivals.end(),
+            [](const Rival& a, const Rival& b) { return a.delta_bic < b.delta_bic; });
+  return rivals;
+}
+
+/// Blocks of the solution that are not of an effect.
+Subset without_effect(const SearchResult& found, const EffectId& id) {
+  return without_if(found.solution.blocks,
+                    [&](std::size_t b) { return same_name(found.system->blocks[b].id, id); });
+}
+
+}  // namespace
+
+std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& selection,
+                                       const PermutationNull& chance, const LeftOutPoses& left_out) {
+  const SearchResult& found = selection.found;
+  const SubsetSearch& search = *found.search;
+  const double all_cv = left_out.chi2_per_number(search, found.solution);
+  std::vector<FoundEffect> effects;
+  for (const Hypothesis& h : found.hypotheses) {
+    if (h.function) continue;
+    // A second local fault of the same curve is no other effect.
+    if (std::any_of(effects.begin(), effects.end(),
+                    [&](const FoundEffect& e) { return same_name(e.id, h.id); }))
+      continue;
+    FoundEffect effect;
+    effect.id = h.id;
+    const Subset without = without_effect(found, h.id);
+    const Scored less = search.score(without);
+    effect.delta_bic = found.solution.gain - less.gain;
+    effect.p_value = chance.p_value(effect.delta_bic);
+    const double cv = left_out.chi2_per_number(search, less);
+    effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
+    effect.pushed = !is_measurement_effect(effect.id.effect);
+    effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
+    describe(effect, selection.refit, robot, *selection.rows, found.system->nuisance);
+    effects.push_back(std::move(effect));
+  }
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic > b.delta_bic; });
+  return effects;
+}
+
+std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vector<FoundEffect>& effects,
+                                    const LeftOutPoses& left_out) {
+  const GapSystem& system = *selection.found.system;
+  const SubsetSearch& search = *selection.found.search;
+  std::vector<DiagnosisStep> steps;
+  Subset so_far;
+  const auto step = [&](std::string what) {
+    const Scored s = search.score(so_far);
+    const ResidualAnalysis r = residual_after(search, s);
+    DiagnosisStep d;
+    d.what = std::move(what);
+    d.chi2_per_dof = r.residual.squaredNorm() / std::max(1.0, system.numbers - r.fitted_numbers);
+    d.cross_validated = left_out.chi2_per_number(search, s);
+    double square = 0;
+    double count = 0;
+    for (std::size_t k = 0; k < system.rows; ++k) {
+      if (!system.counts[k]) continue;
+      square +=
+          unwhitened(selection.rows->at(k), r.residual.segment<6>(first_number(k))).head<3>().squaredNorm();
+      ++count;
+    }
+    d.train_rms_m = std::sqrt(square / std::max(1.0, count));
+    steps.push_back(d);
+  };
+  step("the model at the start");
+  for (const FoundEffect& effect : effects) {
+    for (const std::size_t b : selection.found.solution.blocks) {
+      if (same_name(system.blocks[b].id, effect.id)) so_far.push_back(b);
+    }
+    step(name(effect.id));
+  }
+  for (const std::size_t b : selection.found.solution.blocks) {
+    if (!system.blocks[b].is_function()) continue;
+    so_far.push_back(b);
+    step(fmt::format("{} as a smooth function", place_name(system.blocks[b].id.place)));
+  }
+  return steps;
+}
+
+Misfit misfit_of(const FoundEffect& effect, const std::vector<PlaceShare>& places) {
+  Misfit m;
+  const EffectId& id = effect.id;
+  const auto theta = [](unsigned joint) { return Place{static_cast<std::uint8_t>(joint), slot::theta}; };
+  m.joint = id.joint;
+  switch (id.effect) {
+    case Effect::link_gravity:
+      m.place = theta(2);
+      m.joint = 2;
+      m.covariates = {"q2", "q3"};
+      break;
+    case Effect::axis_wobble:
+      m.place = {static_cast<std::uint8_t>(id.joint), slot::alpha};
+      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
+      break;
+    case Effect::joint_compliance:
+    case Effect::nonlinear_compliance:
+      m.place = theta(id.joint);
+      m.covariates = {"payload_kg"};
+      break;
+    case Effect::backlash:
+      m.place = theta(id.joint);
+      m.covariates = {covariate_name(Covariate::direction, id.joint)};
+      break;
+    case Effect::readout_lag:
+      m.place = theta(id.joint);
+      m.covariates = {covariate_name(Covariate::relative_speed, id.joint)};
+      break;
+    case Effect::joint_coupling:
+      m.place = theta(id.joint);
+      m.covariates = {covariate_name(Covariate::joint_position, id.from)};
+      break;
+    case Effect::link_bending:
+      m.place = {static_cast<std::uint8_t>(id.link), slot::alpha};
+      m.joint = id.link;
+      m.covariates = {"payload_kg"};
+      break;
+    case Effect::thermal_growth:
+      m.place = {static_cast<std::uint8_t>(std::max(1U, id.link)), slot::a};
+      m.joint = id.link;
+      m.covariates = {"temp_c"};
+      break;
+    case Effect::base_drift:
+      m.place = {body::base, slot::x};
+      m.covariates = {"time_s"};
+      break;
+    case Effect::base_compliance:
+      m.place = {body::base, slot::rx};
+      m.covariates = {"payload_kg"};
+      break;
+    case Effect::payload_error:
+      m.place = {body::load, slot::mass};
+      m.covariates = {"payload_kg"};
+      break;
+    case Effect::reflector_slip:
+      m.place = {body::point, slot::x};
+      m.covariates = {"time_s"};
+      break;
+    default:
+      m.place = theta(id.joint);
+      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
+      break;
+  }
+  m.around_deg.assign(m.covariates.size(), std::nullopt);
+  for (const PlaceShare& p : places) {
+    if (p.place == m.place) {
+      m.explains = p.explains;
+      m.p_value = p.p_value;
+    }
+  }
+  return m;
+}
+
+}  // namespace flexcomp::host

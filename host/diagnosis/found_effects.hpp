@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Uncertainty of the selected effects: coefficients, sizes, p-values (D17), confounded effects, and errors step by step.
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
+
+#include <vector>
+
+#include "diagnosis/permutation_null.hpp"
+#include "diagnosis/search_and_refit.hpp"
+
+namespace flexcomp::host {
+
+/// The effects of the catalogue in a selection, largest gain first.
+std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& selection,
+                                       const PermutationNull& chance, const LeftOutPoses& left_out);
+
+/// Errors of the start, and after each effect and unnamed function that is added in turn.
+std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vector<FoundEffect>& effects,
+                                    const LeftOutPoses& left_out);
+
+/// Where a named effect acts, as a misfit of the start.
+Misfit misfit_of(const FoundEffect& effect, const std::vector<PlaceShare>& places);
+
+}  // namespace flexcomp::host
+
+#endif
