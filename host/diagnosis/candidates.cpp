@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/candidates.hpp"
+#include "model/effects/descriptor.hpp"
 
 #include <algorithm>
 #include <array>

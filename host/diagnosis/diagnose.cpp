@@ -27,7 +27,7 @@ FittedModel starting_model(const Robot& robot, const std::vector<Observation>& r
   Identification base = identify(robot, rows, source, identify_options);
   for (const std::string& d : base.doubts) out.doubts.push_back("the model at the start: " + d);
   out.before.confounded = base.calibration.confounded;
-  return {std::move(base.fit), std::move(base.known.fitted)};
+  return {std::move(base.fit), std::move(base.identifiability.fitted)};
 }
 
 double noise_floor(const std::vector<Observation>& rows) {

@@ -56,7 +56,7 @@ Estimate EffectSearch::extended(const Estimate& nuisance, const SearchResult* fo
   for (std::size_t v = 0; v < own.values.size(); ++v) out.set.values[v] = nuisance.set.values[v];
   if (found == nullptr) return out;
   for (const Hypothesis& h : found->hypotheses) {
-    if (h.id.effect == Effect::reflector_slip) continue;  // its step is not the candidates' own
+    if (is_step(h.id)) continue;  // its step is not the candidates' own
     for (std::size_t k = 0; k < h.parameters.size(); ++k)
       candidates_.parameters[h.parameters[k]].set(out.set, h.value[static_cast<Eigen::Index>(k)]);
   }
@@ -95,7 +95,7 @@ Scored EffectSearch::select_effects(ScannedBlocks& scanned, SubsetSearch& search
     scanned.scan(residual_after(search, best), 1, least_touched_);
     // Each scanned one is looked for anew with the others in place: the first look had them in the way.
     for (const std::size_t b : best.blocks) {
-      if (!blocks[b].is_local() && blocks[b].id.effect != Effect::reflector_slip) continue;
+      if (!blocks[b].is_local() && !is_step(blocks[b].id)) continue;
       scanned.scan(residual_after(search, search.score(without(best.blocks, b))), 1, least_touched_);
     }
     const Scored better = search.best(most_effects, {best.blocks});
@@ -207,8 +207,8 @@ SearchResult EffectSearch::run(const std::function<void(double)>& progress) cons
 
 SearchResult EffectSearch::run_again(const Refit& refit, const SearchResult& found) const {
   const double noise_scale2 = found.search->noise_scale2();
-  SearchResult again =
-      search(extended(refit.fit.estimate, &found), refit.fit.has_full_weight(rows_.size()), noise_scale2, &found);
+  SearchResult again = search(extended(refit.fit.estimate, &found), refit.fit.has_full_weight(rows_.size()),
+                              noise_scale2, &found);
   test_lack_of_fit(again);
   again.notes = found.notes;
   if (found.unnamed && !again.unnamed && noise_scale2 > 1) {

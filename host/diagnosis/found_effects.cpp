@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/found_effects.hpp"
+#include "model/covariate.hpp"
+#include "model/effects/descriptor.hpp"
+#include "model/place.hpp"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -105,7 +108,7 @@ std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& sele
     effect.p_value = chance.p_value(effect.delta_bic);
     const double cv = left_out.chi2_per_number(search, less);
     effect.cross_validation = cv > 0 ? 1 - all_cv / cv : 0;
-    effect.pushed = !is_measurement_effect(effect.id.effect);
+    effect.pushed = !belongs_to_measurement(effect.id.effect);
     effect.confounded_with = rivals_of(search, found.solution, without, effect.id);
     describe(effect, selection.refit, robot, *selection.rows, found.system->nuisance);
     effects.push_back(std::move(effect));
@@ -157,65 +160,12 @@ std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vecto
 Misfit misfit_of(const FoundEffect& effect, const std::vector<PlaceShare>& places) {
   Misfit m;
   const EffectId& id = effect.id;
-  const auto theta = [](unsigned joint) { return Place{static_cast<std::uint8_t>(joint), slot::theta}; };
-  m.joint = id.joint;
-  switch (id.effect) {
-    case Effect::link_gravity:
-      m.place = theta(2);
-      m.joint = 2;
-      m.covariates = {"q2", "q3"};
-      break;
-    case Effect::axis_wobble:
-      m.place = {static_cast<std::uint8_t>(id.joint), slot::alpha};
-      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
-      break;
-    case Effect::joint_compliance:
-    case Effect::nonlinear_compliance:
-      m.place = theta(id.joint);
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::backlash:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::direction, id.joint)};
-      break;
-    case Effect::readout_lag:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::relative_speed, id.joint)};
-      break;
-    case Effect::joint_coupling:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::joint_position, id.from)};
-      break;
-    case Effect::link_bending:
-      m.place = {static_cast<std::uint8_t>(id.link), slot::alpha};
-      m.joint = id.link;
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::thermal_growth:
-      m.place = {static_cast<std::uint8_t>(std::max(1U, id.link)), slot::a};
-      m.joint = id.link;
-      m.covariates = {"temp_c"};
-      break;
-    case Effect::base_drift:
-      m.place = {body::base, slot::x};
-      m.covariates = {"time_s"};
-      break;
-    case Effect::base_compliance:
-      m.place = {body::base, slot::rx};
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::payload_error:
-      m.place = {body::load, slot::mass};
-      m.covariates = {"payload_kg"};
-      break;
-    case Effect::reflector_slip:
-      m.place = {body::point, slot::x};
-      m.covariates = {"time_s"};
-      break;
-    default:
-      m.place = theta(id.joint);
-      m.covariates = {covariate_name(Covariate::joint_position, id.joint)};
-      break;
+  const EffectDescriptor& d = descriptor(id.effect);
+  m.place = d.place(id);
+  m.joint = d.has(Selector::link) ? id.link : is_link(m.place) ? m.place.body : 0;
+  const Follows follows = d.follows(id);
+  for (const unsigned joint : follows.joint) {
+    if (joint != 0 || m.covariates.empty()) m.covariates.push_back(covariate_name(follows.covariate, joint));
   }
   m.around_deg.assign(m.covariates.size(), std::nullopt);
   for (const PlaceShare& p : places) {

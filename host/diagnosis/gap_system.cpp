@@ -7,6 +7,8 @@
 #include <stdexcept>
 
 #include "linalg/blas.hpp"
+#include "model/effects/descriptor.hpp"
+#include "model/place.hpp"
 
 namespace flexcomp::host {
 
@@ -115,8 +117,7 @@ void add_candidates(GapSystem& system, const CandidateSet& all, const Eigen::Mat
     }
     block.parameters = rank(system.columns, block.columns, columns, kept);
     // Every arm bends: what the paper's model has needs no more than its BIC.
-    const bool usual = block.id.effect == Effect::joint_compliance || block.id.effect == Effect::link_gravity;
-    block.margin = usual ? 0 : least_gain;
+    block.margin = descriptor(block.id.effect).in_paper_model ? 0 : least_gain;
     if (candidate.prior_rad > 0) {
       block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
       block.parameters = 0;

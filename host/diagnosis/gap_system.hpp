@@ -12,6 +12,7 @@
 #include "diagnosis/candidates.hpp"
 #include "identification/residuals.hpp"
 #include "measurement/observation.hpp"
+#include "model/effects/descriptor.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {
@@ -29,6 +30,9 @@ inline Eigen::Index first_number(std::size_t row) { return 6 * static_cast<Eigen
 inline unsigned joint_of(Place place) {
   return place.body >= 1 && place.body <= joint_count ? place.body : 0;
 }
+
+/// Whether the effect is a step in time, whose time a scan finds.
+inline bool is_step(const EffectId& id) { return descriptor(id.effect).has(Selector::after); }
 
 /// Columns that enter and leave together, and what they cost.
 struct Block {

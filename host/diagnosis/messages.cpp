@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "model/covariate.hpp"
+#include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
 #include "units.hpp"
 

@@ -9,6 +9,7 @@
 #include "diagnosis/spline.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/fitted_calibration.hpp"
+#include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
 
@@ -83,12 +84,10 @@ struct ExtendedModel {
     for (std::size_t k = first; k < model.parameters.size(); ++k) {
       if (!free[k - first]) continue;
       PriorKnowledge prior;
-      if (h.id.effect == Effect::joint_compliance || h.id.effect == Effect::backlash ||
-          h.id.effect == Effect::readout_lag)
-        prior.least = 0;
+      const EffectDescriptor& d = descriptor(h.id.effect);
+      if (d.is_nonnegative) prior.least = 0;
       // No effect is a hundred times its usual size: where only a part of it is known, the rest stays small.
-      if (h.id.effect != Effect::joint_compliance && h.id.effect != Effect::link_gravity)
-        prior.tolerance = 100 * unit_of(model.parameters[k], model.set);
+      if (!d.in_paper_model) prior.tolerance = 100 * unit_of(model.parameters[k], model.set);
       release(k, prior);
     }
   }

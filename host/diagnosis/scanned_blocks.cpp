@@ -22,10 +22,13 @@ constexpr double curve_unit_rad = 1e-4;
 std::optional<SlipColumns> slip_columns(const Robot& robot, const std::vector<Observation>& rows,
                                         const std::vector<bool>& counts, const Estimate& at,
                                         const CandidateSet& candidates) {
-  if (!candidates.has_slip) return {};
+  const auto slip = std::find_if(candidates.list.begin(), candidates.list.end(),
+                                 [](const Candidate& c) { return c.steps; });
+  if (slip == candidates.list.end()) return {};
   SlipColumns out;
-  out.candidate = candidates.list.size() - 1;
-  out.parameters = candidates.list.back().parameters;
+  out.id = slip->id;
+  out.candidate = static_cast<std::size_t>(slip - candidates.list.begin());
+  out.parameters = slip->parameters;
   Unknowns three;
   for (const std::size_t p : out.parameters) three.parameters.push_back(candidates.parameters[p]);
   const auto model = prepare(at.set, robot, "diagnosis");
@@ -74,7 +77,7 @@ void ScannedBlocks::add_local_faults(const std::vector<LocalCurve>& fresh) {
 void ScannedBlocks::add_slips(const std::vector<Slip>& found) {
   for (const Slip& slip : found) {
     const bool there = std::any_of(system_.blocks.begin(), system_.blocks.end(), [&](const Block& b) {
-      return b.id.effect == Effect::reflector_slip && b.id.after_s == slip.after_s;
+      return is_step(b.id) && b.id.after_s == slip.after_s;
     });
     if (there) continue;
     Eigen::VectorXd step(static_cast<Eigen::Index>(rows_.size()));
@@ -83,7 +86,8 @@ void ScannedBlocks::add_slips(const std::vector<Slip>& found) {
     Eigen::MatrixXd columns(slip_->point[0].size(), 3);
     for (int c = 0; c < 3; ++c) columns.col(c) = times(slip_->point[static_cast<std::size_t>(c)], step);
     Block block;
-    block.id = EffectId{.effect = Effect::reflector_slip, .after_s = slip.after_s};
+    block.id = slip_->id;
+    block.id.after_s = slip.after_s;
     block.candidate = slip_->candidate;
     block.parameters = 4;  // three translations and the time
     block.margin = least_gain;

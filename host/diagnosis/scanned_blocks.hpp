@@ -21,6 +21,7 @@ namespace flexcomp::host {
 
 /// What a step of the measured point is made of: whitened columns of its translations, and its candidate.
 struct SlipColumns {
+  EffectId id;
   std::array<Eigen::VectorXd, 3> point;
   std::size_t candidate = 0;  ///< index into CandidateSet::list
   std::vector<std::size_t> parameters;

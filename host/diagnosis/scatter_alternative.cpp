@@ -9,6 +9,8 @@
 #include "diagnosis/outlier_hypotheses.hpp"
 #include "diagnosis/residual_analysis.hpp"
 #include "diagnosis/scatter.hpp"
+#include "model/effects/descriptor.hpp"
+#include "model/place.hpp"
 
 namespace flexcomp::host {
 
@@ -54,7 +56,8 @@ void describe_scatter(SearchResult& found, const std::vector<Scatter>& scatter,
         place_name(s.place), size_text(s)));
   }
   for (const NotTestable& n : not_testable) {
-    if ((n.effect != Effect::backlash && n.effect != Effect::readout_lag) || n.needs.empty()) continue;
+    const Needs needs = descriptor(n.effect).needs;
+    if ((needs != Needs::direction && needs != Needs::moves) || n.needs.empty()) continue;
     if (most.place.slot == slot::theta)
       found.notes.push_back(fmt::format("{} would look like this; to test it record {}",
                                         effect_name(n.effect), fmt::join(n.needs, ", ")));

@@ -7,6 +7,7 @@
 
 #include "diagnosis/spline.hpp"
 #include "linalg/blas.hpp"
+#include "model/covariate.hpp"
 
 namespace flexcomp::host {
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "linalg/blas.hpp"
+#include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
 
@@ -20,10 +21,6 @@ constexpr double nearly_free = 1e-8;
 
 /// Squared share of a column outside the span of others below which it counts as spanned by them.
 constexpr double spanned = 1e-6;
-
-bool follows_own_reading(Effect e) {
-  return e == Effect::gear_harmonic || e == Effect::encoder_scale || e == Effect::joint_curve;
-}
 
 /// The Occam factor of the evidence (D3): -ln of the block's part of the determinant, from `from` on in the Cholesky factor.
 void subtract_evidence_cost(double& gain, const Block& block, const Eigen::MatrixXd& factor,
@@ -40,18 +37,12 @@ bool is_part_of(const Block& function, const EffectId& id) {
     return std::find(function.function_readings.begin(), function.function_readings.end(), joint) !=
            function.function_readings.end();
   };
-  switch (id.effect) {
-    case Effect::gear_harmonic:
-    case Effect::encoder_scale:
-    case Effect::joint_curve:
-      return follows(id.joint);
-    case Effect::joint_coupling:
-      return follows(id.from);
-    case Effect::nonlinear_compliance:
-      return function.function_load;
-    default:
-      return false;
-  }
+  const EffectDescriptor& d = descriptor(id.effect);
+  if (d.in_paper_model || d.place(id) != Place{static_cast<std::uint8_t>(id.joint), slot::theta})
+    return false;
+  const Follows of = d.follows(id);
+  if (of.covariate == Covariate::payload) return function.function_load;
+  return of.covariate == Covariate::joint_position && follows(of.joint[0]);
 }
 
 }  // namespace
@@ -92,22 +83,21 @@ bool SubsetSearch::compatible(std::size_t a, std::size_t b) const {
   for (const auto& [f, other] : {std::pair{&system_.blocks[a], &y}, std::pair{&system_.blocks[b], &x}}) {
     if (f->function_joint != 0 && is_part_of(*f, *other)) return false;
   }
-  if (x.effect == Effect::reflector_slip && y.effect == Effect::reflector_slip)
-    return std::abs(x.after_s - y.after_s) > 0;
+  const EffectDescriptor& d = descriptor(x.effect);
+  if (x.effect == y.effect && d.has(Selector::after)) return std::abs(x.after_s - y.after_s) > 0;
   if (same_name(x, y)) {
     // Several local faults of one joint make one curve.
-    return x.effect == Effect::joint_curve && system_.blocks[a].width_rad > 0 &&
-           system_.blocks[b].width_rad > 0 &&
+    return system_.blocks[a].width_rad > 0 && system_.blocks[b].width_rad > 0 &&
            std::abs(std::remainder(system_.blocks[a].centre_rad - system_.blocks[b].centre_rad, 2 * pi)) >
                system_.blocks[a].width_rad + system_.blocks[b].width_rad;
   }
-  if (x.effect == Effect::thermal_growth && y.effect == Effect::thermal_growth &&
-      (x.link == 0 || y.link == 0))
-    return false;
-  if (x.joint == y.joint && follows_own_reading(x.effect) && follows_own_reading(y.effect)) {
-    const bool curve_x = x.effect == Effect::joint_curve && system_.blocks[a].width_rad == 0;
-    const bool curve_y = y.effect == Effect::joint_curve && system_.blocks[b].width_rad == 0;
-    return !curve_x && !curve_y;  // the smooth curve contains the other
+  if (x.effect == y.effect && d.all_links_by_default && (x.link == 0 || y.link == 0)) return false;
+  if (x.joint == y.joint && follows_own_joint(x) && follows_own_joint(y)) {
+    const auto is_smooth_curve = [&](std::size_t block) {
+      return descriptor(system_.blocks[block].id.effect).table == TableKind::curve &&
+             system_.blocks[block].width_rad == 0;
+    };
+    return !is_smooth_curve(a) && !is_smooth_curve(b);  // the smooth curve contains the other
   }
   return true;
 }
