@@ -8,7 +8,7 @@
 
 namespace {
 
-/// A filter that lists every test whose source ends with `name`.
+/// A filter that lists every test of the source `name`.
 std::string tests_of(const std::string& name) {
   std::string filter;
   const testing::UnitTest& all = *testing::UnitTest::GetInstance();
@@ -17,7 +17,7 @@ std::string tests_of(const std::string& name) {
     for (int t = 0; t < suite.total_test_count(); ++t) {
       const testing::TestInfo& test = *suite.GetTestInfo(t);
       const std::string source = test.file();
-      if (source.size() > name.size() && source.ends_with('/' + name)) {
+      if (source.substr(source.find_last_of('/') + 1) == name) {
         filter += std::string(suite.name()) + '.' + test.name() + ':';
       }
     }
