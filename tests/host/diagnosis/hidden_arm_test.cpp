@@ -253,7 +253,7 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
     std::size_t fits = 0;
     double best = bic_none;
     for (const EffectId& id : judging::every_name(c.robot.nominal, c.robot.capsules.front().from_m.z())) {
-      if (judging::same_name(id, c.hidden.front().id)) continue;
+      if (judging::names_match(id, c.hidden.front().id)) continue;
       if (id.effect == Effect::reflector_slip) continue;
       ParametricModel model{none.estimate.set, oracle.before.identifiability.fitted.parameters};
       const std::size_t first = model.parameters.size();

@@ -25,18 +25,18 @@ double processor_seconds() {
 }
 
 bool is_among(const EffectId& id, const std::vector<Hidden>& hidden) {
-  return std::any_of(hidden.begin(), hidden.end(), [&](const Hidden& h) { return same_name(h.id, id); });
+  return std::any_of(hidden.begin(), hidden.end(), [&](const Hidden& h) { return names_match(h.id, id); });
 }
 
 bool finds(const Diagnosis& d, const EffectId& id) {
   return std::any_of(d.effects.begin(), d.effects.end(),
-                     [&](const FoundEffect& f) { return same_name(f.id, id); });
+                     [&](const FoundEffect& f) { return names_match(f.id, id); });
 }
 
 bool lists(const Diagnosis& d, const EffectId& id) {
   return finds(d, id) || std::any_of(d.effects.begin(), d.effects.end(), [&](const FoundEffect& f) {
            return std::any_of(f.confounded_with.begin(), f.confounded_with.end(),
-                              [&](const Rival& r) { return same_name(r.id, id); });
+                              [&](const Rival& r) { return names_match(r.id, id); });
          });
 }
 
@@ -45,7 +45,7 @@ bool is_wrong(const FoundEffect& found, const Oracle& oracle) {
   if (is_among(found.id, oracle.hidden)) return false;
   return std::none_of(oracle.hidden.begin(), oracle.hidden.end(), [&](const Hidden& h) {
     return !h.decidable() && std::any_of(found.confounded_with.begin(), found.confounded_with.end(),
-                                         [&](const Rival& r) { return same_name(r.id, h.id); });
+                                         [&](const Rival& r) { return names_match(r.id, h.id); });
   });
 }
 

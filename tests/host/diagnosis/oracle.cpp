@@ -279,7 +279,7 @@ void find_rival(const hidden::Case& c, const Fitted& rest, const std::vector<Obs
   std::vector<Promise> promises;
   for (const Candidate& candidate : candidates) {
     const bool true_name = std::any_of(groups.begin(), groups.end(),
-                                       [&](const Group& g) { return same_name(g.id, candidate.id); });
+                                       [&](const Group& g) { return names_match(g.id, candidate.id); });
     if (!true_name) promises.push_back({&candidate, without - bic_gain(candidate, span, left, log_n)});
   }
   std::sort(promises.begin(), promises.end(),
@@ -353,7 +353,7 @@ std::vector<Group> groups_of(const hidden::Case& c, const ParametricModel& model
     id.effect = t.effect;
     id.joint = t.effect == Effect::joint_compliance ? t.place.body : 0U;
     const auto same =
-        std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return same_name(g.id, id); });
+        std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return names_match(g.id, id); });
     if (same == groups.end()) {
       groups.push_back({id, {p}});
     } else {
@@ -369,7 +369,7 @@ bool Oracle::decidable() const {
   return std::all_of(hidden.begin(), hidden.end(), [](const Hidden& h) { return h.decidable(); });
 }
 
-bool same_name(const EffectId& a, const EffectId& b) {
+bool names_match(const EffectId& a, const EffectId& b) {
   return a.effect == b.effect && a.joint == b.joint && a.from == b.from && a.link == b.link &&
          a.order == b.order && a.factor == b.factor;
 }

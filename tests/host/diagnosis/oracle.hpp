@@ -43,7 +43,7 @@ Oracle oracle_of(const hidden::Case& c);
 std::vector<flexcomp::host::EffectId> every_name(const flexcomp::host::Nominal& robot, double pivot_z_m);
 
 /// The same name: kind, joint, order, from, link.
-bool same_name(const flexcomp::host::EffectId& a, const flexcomp::host::EffectId& b);
+bool names_match(const flexcomp::host::EffectId& a, const flexcomp::host::EffectId& b);
 
 /// Root mean square of the 3-D position error.
 double rms_m(const flexcomp::host::Estimate& estimate, const flexcomp::host::Robot& robot,
