@@ -101,11 +101,13 @@ void ControllerClient::greet() {
   wire::decode(bytes.data(), byte_order(), capability_);
   constexpr unsigned major = wire::protocol_version >> 8U;
   if (capability_.protocol >> 8U != major || capability_.joints != wire::joints) {
-    throw BusError(fmt::format(
-        "{}: what answers is no flexcomp controller that this program knows: it says protocol {}.{} and {} "
-        "joints, expected protocol {}.x and {} joints",
-        where_, capability_.protocol >> 8U, capability_.protocol & 0xFFU, capability_.joints, major,
-        wire::joints));
+    throw BusError(
+        where_,
+        fmt::format(
+            "what answers is no flexcomp controller that this program knows: it says protocol {}.{} and {} "
+            "joints, expected protocol {}.x and {} joints",
+            capability_.protocol >> 8U, capability_.protocol & 0xFFU, capability_.joints, major,
+            wire::joints));
   }
 }
 
@@ -134,8 +136,9 @@ std::optional<Robot> ControllerClient::robot() {
   if (nominal_hash(out.nominal) != capability_.nominal_hash ||
       (size != 0 && name_hash(name.data(), size) != capability_.name_hash)) {
     throw BusError(
-        fmt::format("{}: the robot that the controller tells ('{}') does not have the hashes that it tells",
-                    where_, out.name));
+        where_,
+        fmt::format("the robot that the controller tells ('{}') does not have the hashes that it tells",
+                    out.name));
   }
   return out;
 }
@@ -160,12 +163,13 @@ void ControllerClient::run(wire::Command command, std::uint32_t argument) {
       const std::string why = answer == wire::Answer::accepted
                                   ? "nothing has changed, and the reason is overtaken by another client"
                                   : describe(answer, refusal, now.detail);
-      throw RefusedByController(fmt::format("{}: asked to {}, the controller failed: {}", where_, what, why),
+      throw RefusedByController(where_, fmt::format("asked to {}, the controller failed: {}", what, why),
                                 answer, refusal);
     }
     if (steady_clock::now() > end) {
-      throw NoAnswer(fmt::format("{}: asked to {}, the controller is still writing its memory after {:.1f} s",
-                                 where_, what, static_cast<double>(options_.working.count()) / 1000));
+      throw NoAnswer(
+          where_, fmt::format("asked to {}, the controller is still writing its memory after {:.1f} s", what,
+                              static_cast<double>(options_.working.count()) / 1000));
     }
     std::this_thread::sleep_for(between_questions);
   }
@@ -177,8 +181,8 @@ Bytes ControllerClient::active_image(const Progress& progress) {
     const wire::Status before = status();
     if (before.active_slot == wire::no_slot) return {};
     if (before.active_bytes > longest_image) {
-      throw BusError(
-          fmt::format("{}: the controller tells of an active set of {} bytes", where_, before.active_bytes));
+      throw BusError(where_,
+                     fmt::format("the controller tells of an active set of {} bytes", before.active_bytes));
     }
     Bytes image;
     try {
@@ -193,7 +197,7 @@ Bytes ControllerClient::active_image(const Progress& progress) {
       return image;
     }
   }
-  throw BusError(fmt::format("{}: the active set changed each of the three times that it was read", where_));
+  throw BusError(where_, "the active set changed each of the three times that it was read");
 }
 
 wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
@@ -236,12 +240,14 @@ void ControllerClient::explain(const std::string& what, const SaidNo& no) {
   const bool told = now.answer != 0xFFFF && answer != wire::Answer::accepted && answer != wire::Answer::busy;
   if (no.busy) {
     throw RefusedByController(
-        fmt::format("{}: asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
-                    where_, what, static_cast<double>(options_.patience.count()) / 1000, no.code),
+        where_,
+        fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work", what,
+                    static_cast<double>(options_.patience.count()) / 1000, no.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(
-      fmt::format("{}: asked to {}, the controller refused: {}", where_, what,
+      where_,
+      fmt::format("asked to {}, the controller refused: {}", what,
                   told ? fmt::format("{} ({})", describe(answer, refusal, now.detail), no.code) : no.code),
       told ? answer : wire::Answer::refused, told ? refusal : Refusal::none);
 }

@@ -22,6 +22,10 @@ namespace flexcomp::host {
 std::vector<std::string> beyond_capability(const wire::Capability& capability,
                                            std::span<const std::uint8_t> image);
 
+/// \throws BusError  naming what of the image of `source` is beyond_capability()
+void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
+                              std::span<const std::uint8_t> image);
+
 /// One more than the newest set that the controller has. \throws BusError where there is no higher number
 std::uint32_t next_sequence(ControllerClient& client);
 
@@ -45,6 +49,10 @@ Calibration load_calibration_for(ControllerClient& client, const std::string& pa
 
 /// The active set. \throws BusError where there is none or its bytes are damaged
 Bytes pull_image(ControllerClient& client, const Progress& progress = {});
+
+/// The terms of an image that a controller holds. \throws BusError where they cannot be named
+Calibration calibration_held(const ControllerClient& client, std::span<const std::uint8_t> image,
+                             const Robot& robot);
 
 /// The bytes of a file if they are a parameter image, which begins with "FLXC". \throws InputError
 std::optional<Bytes> read_image_file(const std::string& path);

@@ -220,7 +220,7 @@ std::optional<double> parse_number(std::string_view text, char decimal, const Un
 }
 
 void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given,
-                                   const std::vector<std::size_t>& small, const char* how) {
+                                   const std::vector<std::size_t>& small, ErrorCode ambiguous) {
   if (given) {
     dialect.decimal = *given;
     return;
@@ -257,10 +257,8 @@ void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, cons
   if (seen != 0 && !sure) {
     throw InputError(
         path, first_line, column_label(first_column),
-        fmt::format("a number whose comma is a decimal comma for sure, or {} (comma); commas that part "
-                    "thousands are not read",
-                    how),
-        "'" + first_cell + "'");
+        "a number whose comma is certainly a decimal comma; commas that separate thousands are not read",
+        "'" + first_cell + "'", ambiguous);
   }
   if (seen != 0) dialect.decimal = seen;
 }
@@ -279,7 +277,7 @@ std::string DelimitedText::column_label(std::size_t column) const {
 }
 
 DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
-                             const std::string& header) {
+                             const std::string& header, ErrorCode no_header) {
   const std::string content = read_file(path);
   std::string_view text = content;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -334,7 +332,8 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
   }
 
   if (!header.empty()) {
-    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text));
+    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text),
+                     no_header);
   }
   std::vector<Line> table;
   for (const Line& line : lines) {
@@ -354,9 +353,9 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
       readable = std::max(readable, rows.rows.size());
       if (rows.rows.size() != table.size()) continue;
       if (found && !same_cells(*found, rows)) {
-        throw InputError(path, table.front().number, "",
-                         "one way to part the fields (--delimiter and --decimal say which)",
-                         fmt::format("{} as well as {}", words(found->dialect), words(rows.dialect)));
+        throw InputError(path, table.front().number, "", "one way to separate the fields",
+                         fmt::format("{} as well as {}", words(found->dialect), words(rows.dialect)),
+                         ErrorCode::ambiguous_dialect);
       }
       if (!found) found = std::move(rows);
     }

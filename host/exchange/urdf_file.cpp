@@ -86,7 +86,7 @@ class Tree {
     xml.Parse(text.c_str());
     if (xml.Error()) {
       throw InputError(path, static_cast<std::size_t>(std::max(0, xml.ErrorRow())), "", "XML",
-                       xml.ErrorDesc());
+                       xml.ErrorDesc(), ErrorCode::not_xml);
     }
     const TiXmlElement* robot = xml.RootElement();
     if (robot == nullptr || robot->ValueStr() != "robot") {
@@ -120,18 +120,18 @@ class Tree {
   InputError error(const urdf::Link& link, const std::string& expected, const std::string& found) const {
     return at("link", link.name, expected, found);
   }
-  InputError error(const std::string& field, const std::string& expected, const std::string& found) const {
-    return {path_, 0, field, expected, found};
+  InputError error(const std::string& argument, const std::string& expected, const std::string& found) const {
+    return {path_, 0, argument, expected, found, ErrorCode::argument};
   }
 
-  /// The link that an option names.
-  LinkPtr link(const std::string& option, const std::string& name) const {
+  /// The link that an argument names.
+  LinkPtr link(const std::string& argument, const std::string& name) const {
     const LinkPtr found = model_->getLink(name);
     if (found) return found;
     std::vector<std::string> known;
     for (const auto& entry : model_->links_) known.push_back(entry.first);
     const std::string near = nearest(name, known);
-    throw error(option,
+    throw error(argument,
                 near.empty() ? fmt::format("one of the links {}", fmt::join(known, ", "))
                              : fmt::format("a link of the file (did you mean '{}'?)", near),
                 "'" + name + "'");
@@ -184,13 +184,13 @@ LinkPtr find_tip(const Tree& tree, const std::vector<LinkPtr>& to_base) {
   }
   if (tips.size() == 1) return tips.front();
   if (tips.empty()) {
-    throw tree.error("--tip",
+    throw tree.error("tip",
                      "a link that is six revolute or continuous joints away from " + to_base.back()->name,
                      fmt::format("ends {}", fmt::join(ends, ", ")));
   }
   std::vector<std::string> names;
   for (const LinkPtr& tip : tips) names.push_back(tip->name);
-  throw tree.error("--tip", "to be told which of several links to take",
+  throw tree.error("tip", "to be told which of several links to take",
                    fmt::format("{}", fmt::join(names, ", ")));
 }
 
@@ -223,11 +223,10 @@ void read_motion(const Tree& tree, const urdf::Joint& from, UrdfJoint& joint,
 std::size_t find_flange(const Tree& tree, const std::vector<LinkPtr>& way, std::size_t last_joint,
                         const std::string& name) {
   if (!name.empty()) {
-    const LinkPtr wanted = tree.link("--flange", name);
+    const LinkPtr wanted = tree.link("flange", name);
     const auto at = std::find(way.begin() + static_cast<std::ptrdiff_t>(last_joint), way.end(), wanted);
     if (at == way.end()) {
-      throw tree.error("--flange",
-                       fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
+      throw tree.error("flange", fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
                        "'" + name + "'");
     }
     return static_cast<std::size_t>(at - way.begin());
@@ -245,8 +244,8 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   UrdfArm arm;
   arm.name = tree.model().getName();
   const std::vector<LinkPtr> to_base =
-      ancestry(links.base.empty() ? LinkPtr(tree.model().getRoot()) : tree.link("--base", links.base));
-  const LinkPtr tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("--tip", links.tip);
+      ancestry(links.base.empty() ? LinkPtr(tree.model().getRoot()) : tree.link("base", links.base));
+  const LinkPtr tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("tip", links.tip);
   const std::vector<LinkPtr> way = ancestry(tip);
   const std::size_t fork = shared(way, to_base);
   arm.base = to_base.back()->name;
