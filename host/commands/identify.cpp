@@ -15,6 +15,7 @@
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
+#include "files/tolerance_file.hpp"
 #include "identification/identification_json.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"

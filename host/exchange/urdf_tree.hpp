@@ -47,7 +47,7 @@ class UrdfTree {
   std::string name() const { return robot_.attribute("name")->value; }
   const UrdfLinkNode* root() const { return root_; }
   const std::map<std::string, UrdfLinkNode>& links() const { return links_; }
-  /// The link that an option names. \throws InputError  none, with the nearest name
+  /// The link that an argument names. \throws InputError  none, with the nearest name
   const UrdfLinkNode* link(const std::string& argument, const std::string& name) const;
 
   /// From the parent's frame to the joint's; 1 where the file has none. \throws InputError  other than three numbers
@@ -63,7 +63,7 @@ class UrdfTree {
     return at(*node.element, fmt::format("{} '{}'", node.element->name, node.name), expected, found);
   }
   InputError argument_error(const std::string& argument, const std::string& expected,
-                          const std::string& found) const {
+                            const std::string& found) const {
     return {path_, 0, argument, expected, found, ErrorCode::argument};
   }
 
