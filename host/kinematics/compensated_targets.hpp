@@ -7,10 +7,10 @@
 #include <array>
 #include <vector>
 
-#include "files/data_file.hpp"
 #include "flexcomp/status.hpp"
 #include "model/calibration.hpp"
 #include "model/parameter_image.hpp"
+#include "model/targets.hpp"
 
 namespace flexcomp::host {
 
