@@ -21,12 +21,13 @@ std::string message(const std::string& file, std::size_t line, const std::string
 }  // namespace
 
 InputError::InputError(std::string file, std::size_t line, std::string field, std::string expected,
-                       std::string found)
+                       std::string found, ErrorCode code)
     : std::runtime_error(message(file, line, field, expected, found)),
       file_(std::move(file)),
       line_(line),
       field_(std::move(field)),
       expected_(std::move(expected)),
-      found_(std::move(found)) {}
+      found_(std::move(found)),
+      code_(code) {}
 
 }  // namespace flexcomp::host

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -28,10 +29,17 @@ void give_hint(const std::string& text) {
 
 int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
   std::fflush(stdout);  // in one file the message stands behind what it is about
-  fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), e.what());
+  fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), message(e));
   const std::vector<CLI::App*> commands = app.get_subcommands();
   give_hint(hint(e, commands.empty() ? "" : commands.front()->get_name()));
   return status(s);
+}
+
+/// Asking for help or the version ends here too, with 0.
+int give_up(const CLI::ParseError& e, const CLI::App& app, const std::vector<std::string>& arguments) {
+  if (app.exit(e) == 0) return status(ExitStatus::done);
+  give_hint(usage_hint(app, arguments));
+  return status(ExitStatus::usage);
 }
 
 }  // namespace
@@ -65,14 +73,14 @@ int main(int argc, char** argv) {
   add_completion(app);
   // The help text would end in the middle of a line.
   for (CLI::App* command : app.get_subcommands({})) command->footer(command->get_footer() + "\n");
+  const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   try {
     app.parse(argc, argv);
     return status(ExitStatus::done);
   } catch (const CLI::ParseError& e) {
-    // Asking for help or the version ends here too, with 0.
-    if (app.exit(e) == 0) return status(ExitStatus::done);
-    give_hint(usage_hint(app, std::vector<std::string>(argv + 1, argv + argc)));
-    return status(ExitStatus::usage);
+    return give_up(e, app, arguments);
+  } catch (const ArgumentError& e) {
+    return give_up(usage_error(e), app, arguments);
   } catch (const InputError& e) {
     return give_up(ExitStatus::input_refused, e, app);
   } catch (const BusError& e) {

@@ -51,7 +51,7 @@ namespace {
 
 host::Descriptor open_can(const host::CanAddress& address) {
   const auto fail = [&address](const std::string& what) {
-    throw host::BusError("can:" + address.interface + ": " + what);
+    throw host::BusError("can:" + address.interface, what);
   };
   host::Descriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
   if (!socket) fail("this kernel has no SocketCAN (" + reason() + "); see hil/with-vcan");
@@ -121,7 +121,7 @@ TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
                  const host::ModbusTcpAddress& address)
     : address_(address) {
   const auto fail = [&address](const std::string& what) {
-    throw host::BusError("modbus-tcp:" + address.host + ":" + std::to_string(address.port) + ": " + what);
+    throw host::BusError("modbus-tcp:" + address.host + ":" + std::to_string(address.port), what);
   };
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
@@ -283,9 +283,9 @@ host::Descriptor RtuPort::open() const {
 RtuPort::RtuPort(firmware::Device& device, firmware::Origin origin, const host::ModbusRtuAddress& address)
     : address_(address), server_(device, origin), line_(server_, address.unit, rtu_gap_us, {this, send}) {
   if (speed(address.baud) == B0)
-    throw host::BusError(text() + ": a baud rate that serial devices do not have");
+    throw host::BusError(text(), "a baud rate that serial devices do not have");
   device_ = open();
-  if (!device_) throw host::BusError(text() + ": " + reason());
+  if (!device_) throw host::BusError(text(), reason());
 }
 
 void RtuPort::wait_on(std::vector<pollfd>& descriptors) const {

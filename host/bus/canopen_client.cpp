@@ -37,10 +37,12 @@ double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
 Descriptor open_can(const std::string& interface, unsigned node, const std::string& where) {
   Descriptor out(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (out.get() < 0) {
-    throw BusError(fmt::format("{}: this system gives no CAN sockets: {}", where, reason(errno)));
+    throw BusError(where, fmt::format("this system gives no CAN sockets: {}", reason(errno)),
+                   ErrorCode::no_can_sockets);
   }
   const unsigned index = if_nametoindex(interface.c_str());
-  if (index == 0) throw BusError(fmt::format("{}: there is no interface '{}'", where, interface));
+  if (index == 0)
+    throw BusError(where, fmt::format("there is no interface '{}'", interface), ErrorCode::bus_not_opened);
   // Extended, remote and other nodes' frames stay in the kernel.
   const can_filter answers{co::sdo_answer_id + node, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
   sockaddr_can to{};
@@ -48,7 +50,8 @@ Descriptor open_can(const std::string& interface, unsigned node, const std::stri
   to.can_ifindex = static_cast<int>(index);
   if (::setsockopt(out.get(), SOL_CAN_RAW, CAN_RAW_FILTER, &answers, sizeof answers) != 0 ||
       ::bind(out.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
-    throw BusError(fmt::format("{}: the interface '{}' cannot be used: {}", where, interface, reason(errno)));
+    throw BusError(where, fmt::format("the interface '{}' cannot be used: {}", interface, reason(errno)),
+                   ErrorCode::bus_not_opened);
   }
   return out;
 }
@@ -58,7 +61,7 @@ Descriptor open_can(const std::string& interface, unsigned node, const std::stri
 /// frees when the process ends.
 Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, const std::string& where) {
   Descriptor out(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  if (out.get() < 0) throw BusError(fmt::format("{}: no local socket: {}", where, reason(errno)));
+  if (out.get() < 0) throw BusError(where, fmt::format("no local socket: {}", reason(errno)));
   const std::string name = fmt::format("flexcomp-sdo-{}-{}", can.interface, can.node);
   sockaddr_un at{};
   at.sun_family = AF_UNIX;
@@ -67,11 +70,11 @@ Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, con
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   const auto end = steady_clock::now() + options.response_timeout;
   while (::bind(out.get(), reinterpret_cast<const sockaddr*>(&at), size) != 0) {
-    if (errno != EADDRINUSE) throw BusError(fmt::format("{}: {}", where, reason(errno)));
+    if (errno != EADDRINUSE) throw BusError(where, fmt::format("{}", reason(errno)));
     if (steady_clock::now() > end) {
-      throw BusError(
-          fmt::format("{}: another program on this machine has been talking to node {} for {:.1f} s", where,
-                      can.node, seconds(options.response_timeout)));
+      throw BusError(where,
+                     fmt::format("another program on this machine has been talking to node {} for {:.1f} s",
+                                 can.node, seconds(options.response_timeout)));
     }
     std::this_thread::sleep_for(milliseconds(20));
   }
@@ -134,8 +137,8 @@ class CanopenClient final : public ControllerClient {
     Bytes out;
     retry("to read", object, attempts, [&] { out = sdo_.upload(object, progress); });
     if (out.size() != size) {
-      throw BusError(fmt::format("{}: object {} of node {} has {} bytes, expected {}", where(), object.text(),
-                                 node_, out.size(), size));
+      throw BusError(where(), fmt::format("object {} of node {} has {} bytes, expected {}", object.text(),
+                                          node_, out.size(), size));
     }
     return out;
   }
@@ -156,16 +159,17 @@ class CanopenClient final : public ControllerClient {
         const bool lost = !e.by_server() || e.code() == co::abort::toggle || e.code() == co::abort::timeout ||
                           e.code() == co::abort::command;
         if (lost && attempt < times) continue;
-        if (!e.by_server()) throw BusError(fmt::format("{}: node {}: {}", where(), node_, e.what()));
+        if (!e.by_server()) throw BusError(where(), fmt::format("node {}: {}", node_, e.what()));
         throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
       } catch (const SdoTimeout& e) {
         if (attempt < times) continue;
-        throw NoAnswer(fmt::format("{}: node {} did not answer when asked {} object {} ({} of {:.2f} s): {}",
-                                   where(), node_, what, object.text(),
-                                   times == 1 ? "one wait" : fmt::format("{} waits", times),
-                                   seconds(timeout_), e.what()));
+        throw NoAnswer(
+            where(),
+            fmt::format("node {} did not answer when asked {} object {} ({} of {:.2f} s): {}", node_, what,
+                        object.text(), times == 1 ? "one wait" : fmt::format("{} waits", times),
+                        seconds(timeout_), e.what()));
       } catch (const std::system_error& e) {
-        throw BusError(fmt::format("{}: {}", where(), e.what()));
+        throw BusError(where(), fmt::format("{}", e.what()));
       }
     }
   }

@@ -102,11 +102,13 @@ void ControllerClient::read_capability() {
   wire::decode(bytes.data(), byte_order(), capability_);
   constexpr unsigned major = wire::protocol_version >> 8U;
   if (capability_.protocol >> 8U != major || capability_.joints != wire::joints) {
-    throw BusError(fmt::format(
-        "{}: what answers is no flexcomp controller that this program knows: it says protocol {}.{} and {} "
-        "joints, expected protocol {}.x and {} joints",
-        where_, capability_.protocol >> 8U, capability_.protocol & 0xFFU, capability_.joints, major,
-        wire::joints));
+    throw BusError(
+        where_,
+        fmt::format(
+            "what answers is no flexcomp controller that this program knows: it says protocol {}.{} and {} "
+            "joints, expected protocol {}.x and {} joints",
+            capability_.protocol >> 8U, capability_.protocol & 0xFFU, capability_.joints, major,
+            wire::joints));
   }
 }
 
@@ -135,8 +137,9 @@ std::optional<Robot> ControllerClient::robot() {
   if (nominal_hash(out.nominal) != capability_.nominal_hash ||
       (size != 0 && name_hash(name.data(), size) != capability_.name_hash)) {
     throw BusError(
-        fmt::format("{}: the robot that the controller tells ('{}') does not have the hashes that it tells",
-                    where_, out.name));
+        where_,
+        fmt::format("the robot that the controller tells ('{}') does not have the hashes that it tells",
+                    out.name));
   }
   return out;
 }
@@ -161,12 +164,13 @@ void ControllerClient::run(wire::Command command, std::uint32_t argument) {
       const std::string why = answer == wire::Answer::accepted
                                   ? "nothing has changed, and the reason is overtaken by another client"
                                   : describe(answer, refusal, now.detail);
-      throw RefusedByController(fmt::format("{}: asked to {}, the controller failed: {}", where_, what, why),
+      throw RefusedByController(where_, fmt::format("asked to {}, the controller failed: {}", what, why),
                                 answer, refusal);
     }
     if (steady_clock::now() > end) {
-      throw NoAnswer(fmt::format("{}: asked to {}, the controller is still writing its memory after {:.1f} s",
-                                 where_, what, static_cast<double>(options_.write_timeout.count()) / 1000));
+      throw NoAnswer(
+          where_, fmt::format("asked to {}, the controller is still writing its memory after {:.1f} s", what,
+                              static_cast<double>(options_.write_timeout.count()) / 1000));
     }
     std::this_thread::sleep_for(polling_interval);
   }
@@ -178,8 +182,8 @@ Bytes ControllerClient::active_image(const Progress& progress) {
     const wire::Status before = status();
     if (before.active_slot == wire::no_slot) return {};
     if (before.active_bytes > longest_image) {
-      throw BusError(
-          fmt::format("{}: the controller tells of an active set of {} bytes", where_, before.active_bytes));
+      throw BusError(where_,
+                     fmt::format("the controller tells of an active set of {} bytes", before.active_bytes));
     }
     Bytes image;
     try {
@@ -194,7 +198,7 @@ Bytes ControllerClient::active_image(const Progress& progress) {
       return image;
     }
   }
-  throw BusError(fmt::format("{}: the active set changed each of the three times that it was read", where_));
+  throw BusError(where_, "the active set changed each of the three times that it was read");
 }
 
 wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
@@ -238,15 +242,15 @@ void ControllerClient::throw_refusal(const std::string& request, const BusRefusa
       now.answer != 0xFFFF && answer != wire::Answer::accepted && answer != wire::Answer::busy;
   if (from_bus.busy) {
     throw RefusedByController(
-        fmt::format("{}: asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
-                    where_, request, static_cast<double>(options_.response_timeout.count()) / 1000,
-                    from_bus.code),
+        where_,
+        fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work", request,
+                    static_cast<double>(options_.response_timeout.count()) / 1000, from_bus.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(
-      fmt::format("{}: asked to {}, the controller refused: {}", where_, request,
-                  has_reason ? fmt::format("{} ({})", describe(answer, refusal, now.detail), from_bus.code)
-                             : from_bus.code),
+      where_,
+      fmt::format("asked to {}, the controller refused: {}", request,
+                  has_reason ? fmt::format("{} ({})", describe(answer, refusal, now.detail), from_bus.code) : from_bus.code),
       has_reason ? answer : wire::Answer::refused, has_reason ? refusal : Refusal::none);
 }
 

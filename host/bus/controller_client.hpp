@@ -38,8 +38,9 @@ struct ClientOptions {
 /// The controller refused a request.
 class RefusedByController : public BusError {
  public:
-  RefusedByController(const std::string& message, wire::Answer answer, Refusal refusal)
-      : BusError(message), answer_(answer), refusal_(refusal) {}
+  RefusedByController(const std::string& address, const std::string& text, wire::Answer answer,
+                      Refusal refusal)
+      : BusError(address, text), answer_(answer), refusal_(refusal) {}
   wire::Answer answer() const { return answer_; }
   Refusal refusal() const { return refusal_; }  ///< where the answer is `refused`
 

@@ -157,8 +157,8 @@ class ModbusClient final : public ControllerClient {
     addrinfo* found = nullptr;
     const int unknown = getaddrinfo(tcp.host.c_str(), nullptr, nullptr, &found);
     if (unknown != 0) {
-      throw BusError(
-          fmt::format("{}: the host '{}' cannot be found: {}", where(), tcp.host, gai_strerror(unknown)));
+      throw BusError(where(),
+                     fmt::format("the host '{}' cannot be found: {}", tcp.host, gai_strerror(unknown)));
     }
     freeaddrinfo(found);
     context_.reset(modbus_new_tcp_pi(tcp.host.c_str(), std::to_string(tcp.port).c_str()));
@@ -189,9 +189,9 @@ class ModbusClient final : public ControllerClient {
     const auto end = steady_clock::now() + options().response_timeout;
     while (flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
       if (steady_clock::now() > end) {
-        throw BusError(fmt::format("{}: another program on this machine has been using {} for {:.1f} s",
-                                   where(), rtu.device,
-                                   static_cast<double>(options().response_timeout.count()) / 1000));
+        throw BusError(
+            where(), fmt::format("another program on this machine has been using {} for {:.1f} s", rtu.device,
+                                 static_cast<double>(options().response_timeout.count()) / 1000));
       }
       std::this_thread::sleep_for(milliseconds(20));
     }
@@ -199,9 +199,10 @@ class ModbusClient final : public ControllerClient {
 
   [[noreturn]] void fail_to_open(int error) const {
     if (error == ETIMEDOUT) {
-      throw NoAnswer(fmt::format("{}: no connection within {:.1f} s", where(), seconds(timeout_)));
+      throw NoAnswer(where(), fmt::format("no connection within {:.1f} s", seconds(timeout_)));
     }
-    throw BusError(fmt::format("{}: cannot be opened: {}", where(), modbus_strerror(error)));
+    throw BusError(where(), fmt::format("cannot be opened: {}", modbus_strerror(error)),
+                   ErrorCode::bus_not_opened);
   }
 
   static double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
@@ -228,8 +229,8 @@ class ModbusClient final : public ControllerClient {
           throw BusRefusal{false, false, "Modbus exception 04, server device failure"};
         case EMBXGPATH:
         case EMBXGTAR:
-          throw BusError(fmt::format("{}: the gateway cannot reach unit {} ({})", where(), unit_,
-                                     modbus_strerror(error)));
+          throw BusError(where(),
+                         fmt::format("the gateway cannot reach unit {} ({})", unit_, modbus_strerror(error)));
         default:
           break;
       }
@@ -238,11 +239,12 @@ class ModbusClient final : public ControllerClient {
       if (!damaged) break;
     }
     if (error == ETIMEDOUT) {
-      throw NoAnswer(fmt::format("{}: unit {} did not answer when asked {} ({} of {:.1f} s)", where(), unit_,
-                                 what, attempts == 1 ? "one wait" : fmt::format("{} waits", attempts),
-                                 seconds(timeout_)));
+      throw NoAnswer(
+          where(),
+          fmt::format("unit {} did not answer when asked {} ({} of {:.1f} s)", unit_, what,
+                      attempts == 1 ? "one wait" : fmt::format("{} waits", attempts), seconds(timeout_)));
     }
-    throw BusError(fmt::format("{}: asked {}, unit {}: {}", where(), what, unit_, modbus_strerror(error)));
+    throw BusError(where(), fmt::format("asked {}, unit {}: {}", what, unit_, modbus_strerror(error)));
   }
 
   std::unique_ptr<modbus_t, Free> context_;

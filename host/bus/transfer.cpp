@@ -15,6 +15,7 @@
 #include "files/yaml_field.hpp"
 #include "flexcomp/image.hpp"
 #include "input_error.hpp"
+#include "model/parameter_image.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -74,9 +75,17 @@ std::uint32_t next_sequence(ControllerClient& client) {
   const wire::Status now = client.status();
   const std::uint32_t newest = std::max(now.active_sequence, now.previous_sequence);
   if (newest == std::numeric_limits<std::uint32_t>::max()) {
-    throw BusError(fmt::format("{}: the active set has the highest sequence there is", client.where()));
+    throw BusError(client.where(), "the active set has the highest sequence there is");
   }
   return newest + 1;
+}
+
+void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
+                              std::span<const std::uint8_t> image) {
+  const std::vector<std::string> beyond = beyond_capability(client.capability(), image);
+  if (beyond.empty()) return;
+  throw BusError(client.where(), fmt::format("{} is more than this controller can do: {}; nothing was sent",
+                                             source, fmt::join(beyond, "; ")));
 }
 
 void push_image(ControllerClient& client, std::span<const std::uint8_t> image, const PushOptions& options) {
@@ -101,14 +110,14 @@ void push_image(ControllerClient& client, std::span<const std::uint8_t> image, c
   }
   const Bytes back = client.active_image(options.progress);
   if (back.size() != image.size()) {
-    throw BusError(fmt::format("{}: the active set has {} bytes after the commit, {} were sent",
-                               client.where(), back.size(), image.size()));
+    throw BusError(client.where(), fmt::format("the active set has {} bytes after the commit, {} were sent",
+                                               back.size(), image.size()));
   }
   const auto [there, sent] = std::mismatch(back.begin(), back.end(), image.begin());
   if (there != back.end()) {
-    throw BusError(
-        fmt::format("{}: byte {} of the active set is 0x{:02X} after the commit, 0x{:02X} was sent",
-                    client.where(), there - back.begin(), *there, *sent));
+    throw BusError(client.where(),
+                   fmt::format("byte {} of the active set is 0x{:02X} after the commit, 0x{:02X} was sent",
+                               there - back.begin(), *there, *sent));
   }
 }
 
@@ -116,22 +125,21 @@ Robot robot_of(ControllerClient& client, const std::string& robot_path) {
   if (robot_path.empty()) {
     std::optional<Robot> told = client.robot();
     if (!told) {
-      throw BusError(
-          fmt::format("{}: this controller does not tell which robot it is for: give its file with --robot",
-                      client.where()));
+      throw BusError(client.where(), "this controller does not tell which robot it is for",
+                     ErrorCode::unknown_robot);
     }
     return *std::move(told);
   }
   Robot robot = load_robot(robot_path);
   const wire::Capability& there = client.capability();
   if (robot.nominal.name_hash != there.name_hash) {
-    throw BusError(fmt::format("{}: the controller is for another robot than '{}' ({})", client.where(),
-                               robot.name, robot.path));
+    throw BusError(client.where(),
+                   fmt::format("the controller is for another robot than '{}' ({})", robot.name, robot.path));
   }
   if (nominal_hash(robot.nominal) != there.nominal_hash) {
-    throw BusError(fmt::format("{}: the controller's nominal geometry is {}, that of {} is {}",
-                               client.where(), short_hex(there.nominal_hash), robot.path,
-                               short_hex(nominal_hash(robot.nominal))));
+    throw BusError(client.where(), fmt::format("the controller's nominal geometry is {}, that of {} is {}",
+                                               short_hex(there.nominal_hash), robot.path,
+                                               short_hex(nominal_hash(robot.nominal))));
   }
   return robot;
 }
@@ -143,9 +151,9 @@ Calibration load_calibration_for(ControllerClient& client, const std::string& pa
   if (const auto field = root.find("robot")) {
     const std::string name = field->text();
     if (name_hash(name.data(), name.size()) != there.name_hash) {
-      throw BusError(fmt::format("{}: {} is for another robot ('{}') than the controller{}; nothing was sent",
-                                 client.where(), path, name,
-                                 robot.name.empty() ? "" : fmt::format(" ('{}')", robot.name)));
+      throw BusError(client.where(),
+                     fmt::format("{} is for another robot ('{}') than the controller{}; nothing was sent",
+                                 path, name, robot.name.empty() ? "" : fmt::format(" ('{}')", robot.name)));
     }
     known.name = name;
   }
@@ -153,9 +161,10 @@ Calibration load_calibration_for(ControllerClient& client, const std::string& pa
     const std::string hash = field->text();
     if (hash.size() == 64 && hash != hex(there.nominal_hash)) {
       throw BusError(
-          fmt::format("{}: {} is for another nominal geometry ({}…) than the controller's ({}); nothing was "
+          client.where(),
+          fmt::format("{} is for another nominal geometry ({}…) than the controller's ({}); nothing was "
                       "sent",
-                      client.where(), path, hash.substr(0, 12), short_hex(there.nominal_hash)));
+                      path, hash.substr(0, 12), short_hex(there.nominal_hash)));
     }
   }
   return load_calibration(path, known);
@@ -164,17 +173,26 @@ Calibration load_calibration_for(ControllerClient& client, const std::string& pa
 Bytes pull_image(ControllerClient& client, const Progress& progress) {
   Bytes image = client.active_image(progress);
   if (image.empty()) {
-    throw BusError(
-        fmt::format("{}: the controller has no active set, it passes commands through", client.where()));
+    throw BusError(client.where(), "the controller has no active set, it passes commands through");
   }
   const wire::Capability& there = client.capability();
   ImageHeader header;
   const Refusal refusal =
       check_image(image.data(), image.size(), there.nominal_hash, there.name_hash, header);
   if (refusal != Refusal::none) {
-    throw BusError(fmt::format("{}: what was read is not the active set: {}", client.where(), text(refusal)));
+    throw BusError(client.where(), fmt::format("what was read is not the active set: {}", text(refusal)));
   }
   return image;
+}
+
+Calibration calibration_held(const ControllerClient& client, std::span<const std::uint8_t> image,
+                             const Robot& robot) {
+  try {
+    return calibration_from_image(image, robot, client.where());
+  } catch (const InputError& e) {
+    // The bytes came from the controller: it is no file of the user's that is refused.
+    throw BusError(client.where(), InputError("", e.line(), e.field(), e.expected(), e.found()).what());
+  }
 }
 
 std::optional<Bytes> read_image_file(const std::string& path) {

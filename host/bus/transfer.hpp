@@ -22,6 +22,10 @@ namespace flexcomp::host {
 std::vector<std::string> beyond_capability(const wire::Capability& capability,
                                            std::span<const std::uint8_t> image);
 
+/// \throws BusError  naming what of the image of `source` is beyond_capability()
+void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
+                              std::span<const std::uint8_t> image);
+
 /// Next sequence number: one above the newest set of the controller. \throws BusError where 2^32 - 1 is reached
 std::uint32_t next_sequence(ControllerClient& client);
 
@@ -47,6 +51,10 @@ Calibration load_calibration_for(ControllerClient& client, const std::string& pa
 
 /// Reads and checks the active image. \throws BusError  none active, or damaged bytes
 Bytes pull_image(ControllerClient& client, const Progress& progress = {});
+
+/// The terms of an image that a controller holds. \throws BusError where they cannot be named
+Calibration calibration_held(const ControllerClient& client, std::span<const std::uint8_t> image,
+                             const Robot& robot);
 
 /// Reads a parameter image, a file that begins with "FLXC"; nothing for other files. \throws InputError
 std::optional<Bytes> read_image_file(const std::string& path);

@@ -5,24 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "commands/colour.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
-
-nlohmann::ordered_json to_json(const ErrorStatistics& s) {
-  nlohmann::ordered_json j{{"mean_mm", s.mean_m * 1e3}, {"rms_mm", s.rms_m * 1e3}, {"max_mm", s.max_m * 1e3}};
-  if (s.mean_rad) j["mean_deg"] = degrees(*s.mean_rad);
-  return j;
-}
-
-nlohmann::ordered_json to_json(const Before& before) {
-  nlohmann::ordered_json j{{"nominal_frames", to_json(before.nominal_frames)}};
-  if (before.fitted_frames) j["fitted_frames"] = to_json(*before.fitted_frames);
-  return j;
-}
 
 namespace {
 

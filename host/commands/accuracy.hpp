@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Errors before and after, as `identify` and `validate` both say them: to people and to machines.
+/// Errors before and after as text for the terminal, for identify, validate and diagnose.
 #ifndef FLEXCOMP_HOST_COMMANDS_ACCURACY_HPP
 #define FLEXCOMP_HOST_COMMANDS_ACCURACY_HPP
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "identification/identify.hpp"
 
 namespace flexcomp::host {
-
-/// {"mean_mm", "rms_mm", "max_mm", "mean_deg"} (the last only where orientations were measured).
-nlohmann::ordered_json to_json(const ErrorStatistics& s);
-
-/// {"nominal_frames": {…}, "fitted_frames": {…}}
-nlohmann::ordered_json to_json(const Before& before);
 
 /// The three or two lines of a table: before (nominal frames, fitted frames) and after.
 std::string accuracy_table(const Before& before, const ErrorStatistics& after);

@@ -10,16 +10,9 @@
 #include <vector>
 
 #include "files/data_file.hpp"
-#include "flexcomp/status.hpp"
+#include "kinematics/compensated_targets.hpp"
 
 namespace flexcomp::host {
-
-struct Answer {
-  std::array<double, joint_count> q_rad{};  ///< corrected command
-  double residual_m = 0;                    ///< what the flexible model still misses of the target
-  double residual_rad = 0;
-  StepStatus status = StepStatus::no_set;
-};
 
 /// Columns q1_deg … q6_deg, residual_mm, residual_deg, status, and those that were passed through.
 std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& answers);

@@ -2,6 +2,12 @@
 /// \file
 /// The commands of `flexcomp`. Each lives in commands/NAME.cpp and adds itself as a subcommand whose callback does the
 /// work; what goes wrong is thrown (errors.hpp) and becomes an exit status in main.cpp.
+///
+/// A command is thin: options in, one library call, then text, JSON and page out. Where the rest is:
+/// - JSON of a result beside its type: MODULE/RESULT_json (planning/plan_json.hpp).
+/// - Pages in report/: RESULT_page or results.hpp.
+/// - Text for the terminal here: RESULT_text; only commands/ knows colours and option names.
+/// - Errors of library code carry a code (error_code.hpp); hints.cpp adds the options and hints that belong to it.
 #ifndef FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
 #define FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
 

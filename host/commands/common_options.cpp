@@ -36,14 +36,21 @@ void CommonOptions::write_json(const nlohmann::ordered_json& result) const {
   if (!json.empty()) write_file(json, result.dump(2) + "\n");
 }
 
+void CommonOptions::write_report(const std::string& path, const std::function<Page()>& make) const {
+  if (path.empty()) return;
+  write_file(path, html(make()));
+  say(path + ": written");
+}
+
 void add_robot_option(CLI::App& app, std::string& path) {
   app.add_option("--robot", path, "Robot file (nominal geometry, limits, tool, payload)")
       ->type_name("ROBOT.yaml")
       ->required();
 }
 
-void add_force_option(CLI::App& app, bool& force) {
-  app.add_flag("--force", force, "Go on where input is only suspicious (readings that look like radians)");
+CLI::Option* add_force_option(CLI::App& app, bool& force) {
+  return app.add_flag("--force", force,
+                      "Go on where input is only suspicious (readings that look like radians)");
 }
 
 }  // namespace flexcomp::host

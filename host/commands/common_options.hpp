@@ -6,25 +6,17 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "measurement/measured_data.hpp"
 #include "model/paper_model.hpp"
+#include "named_values.hpp"
+#include "report/page.hpp"
 
 namespace flexcomp::host {
-
-/// What options call the models and what is measured.
-inline const std::map<std::string, ModelKind> model_kinds{{"full", ModelKind::full},
-                                                          {"geometric", ModelKind::geometric},
-                                                          {"no-gravity", ModelKind::no_gravity},
-                                                          {"no-stiffness", ModelKind::no_stiffness}};
-inline const std::map<std::string, MeasurementKind> measurement_kinds{
-    {"pose", MeasurementKind::pose},
-    {"position", MeasurementKind::position},
-    {"reflectors", MeasurementKind::reflectors}};
 
 struct CommonOptions {
   std::string json;
@@ -40,12 +32,14 @@ struct CommonOptions {
   void warn(const std::vector<std::string>& warnings) const;
   /// The result as a file, where one is asked for.
   void write_json(const nlohmann::ordered_json& result) const;
+  /// The page that `make` gives as a file, where one is asked for, with a line that says so.
+  void write_report(const std::string& path, const std::function<Page()>& make) const;
 };
 
 /// --robot, required.
 void add_robot_option(CLI::App& app, std::string& path);
 /// --force: go on where input is only suspicious.
-void add_force_option(CLI::App& app, bool& force);
+CLI::Option* add_force_option(CLI::App& app, bool& force);
 
 }  // namespace flexcomp::host
 

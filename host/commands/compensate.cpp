@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "flexcomp/compensate.hpp"
-
 #include <fmt/format.h>
 
 #include <memory>
@@ -17,12 +15,8 @@
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
-#include "flexcomp/forward.hpp"
-#include "flexcomp/image.hpp"
-#include "flexcomp/model.hpp"
-#include "input_error.hpp"
+#include "kinematics/compensated_targets.hpp"
 #include "kinematics/nominal_inverse.hpp"
-#include "model/parameter_image.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -51,26 +45,9 @@ void Compensate::run() {
       of_program ? programs.commands(robot_file, common.quiet) : load_targets(targets, robot_file, {force});
   common.warn(list.warnings);
 
-  // Through the image and a model of the controller's size: what is answered here is what the controller answers.
-  const std::vector<std::uint8_t> image =
-      make_image(set, robot_file, set.sequence.value_or(0), {.allow_unnamed = allow_unnamed});
-  const auto model = std::make_unique<Model<double, joint_count>>();
-  const Refusal refusal = model_from_image(image.data(), image.size(), robot_file.nominal, *model);
-  if (refusal != Refusal::none)
-    throw InputError(calibration, 0, "", "a set that a controller can hold", text(refusal));
-
   const auto commands = joint_commands(list, robot_file);
-  std::vector<Answer> answers;
-  for (std::size_t k = 0; k < commands.size(); ++k) {
-    const auto& context = list.rows[k].context;
-    const auto result = compensate(*model, commands[k], context, CompensationSettings<double>{});
-    // Of a command that is passed through the controller says nothing, and 0 on the wire.
-    TargetResidual<double> residual;
-    if (result.status != StepStatus::refused) {
-      residual = target_residual(*model, result.q, commands[k], context);
-    }
-    answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status});
-  }
+  const std::vector<Answer> answers =
+      compensated(list, commands, set, robot_file, {.allow_unnamed = allow_unnamed});
   write_file(out, of_program ? programs.corrected(robot_file, answers) : answers_text(list, answers));
   // A program has no column for what the controller would say.
   for (std::size_t k = 0; of_program && k < answers.size(); ++k) {

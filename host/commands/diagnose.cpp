@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "diagnosis/diagnose.hpp"
-#include "commands/outputs.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,15 +11,17 @@
 #include "commands/accuracy.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/diagnosis_json.hpp"
+#include "commands/diagnosis_text.hpp"
+#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/held_out.hpp"
 #include "diagnosis/messages.hpp"
 #include "errors.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
-#include "files/write_file.hpp"
 #include "report/results.hpp"
 
 namespace flexcomp::host {
@@ -40,51 +39,8 @@ struct Diagnose {
   bool force = false;
 
   void run() const;
-  void say_effects(const Diagnosis& d, const Robot& robot_file) const;
-  void say_gap(const Diagnosis& d, const std::optional<HeldOut>& others) const;
   bool write_plan(const Diagnosis& d, const Robot& robot_file) const;
 };
-
-std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
-
-void Diagnose::say_effects(const Diagnosis& d, const Robot& robot_file) const {
-  if (!d.effects.empty()) {
-    common.say(fmt::format("  {:<40} {:>12} {:>9} {:>8} {:>10}  {}", "effect", "largest mm", "rms mm", "p",
-                           "delta BIC", "to the controller"));
-  }
-  for (const FoundEffect& e : d.effects) {
-    common.say(fmt::format("  {:<40} {:>12.4f} {:>9.4f} {:>8} {:>10.1f}  {}", name(e.id), e.largest_m * 1e3,
-                           e.rms_m * 1e3, chance(e.p_value), e.delta_bic,
-                           e.pushed ? "yes" : "no: of the measurement"));
-    for (const std::string& line : sizes(e)) common.say("      " + line);
-    if (!e.confounded_with.empty()) common.say("      these data cannot tell it from: " + rivals_text(e));
-  }
-  for (const EffectId& id : unnamed_effects(d, robot_file)) common.say("  " + name(id) + ": " + in_words(id));
-  if (d.where) {
-    common.say(fmt::format("  where {}: {}", d.verdict == Verdict::unnamed ? "the gap is" : "it was",
-                           where_sentence(*d.where)));
-  }
-  for (const NotTestable& n : d.not_testable) common.say("  not tested: " + not_testable_text(n));
-}
-
-void Diagnose::say_gap(const Diagnosis& d, const std::optional<HeldOut>& others) const {
-  const auto line = [this](const std::string& what, const ErrorStatistics& before,
-                           const ErrorStatistics& after, double floor_m) {
-    const double gap = gap_of(before.rms_m, floor_m), left = gap_of(after.rms_m, floor_m);
-    std::string turned;
-    if (before.rms_rad && after.rms_rad)
-      turned = fmt::format("; {:.5f} -> {:.5f} deg", degrees(*before.rms_rad), degrees(*after.rms_rad));
-    common.say(fmt::format("  {:<24} {:>9.4f} {:>9.4f} {:>12.4f} {:>9.4f} -> {:.4f}{}", what,
-                           before.rms_m * 1e3, after.rms_m * 1e3, floor_m * 1e3, gap * 1e3, left * 1e3,
-                           turned));
-  };
-  common.say(fmt::format("  {:<24} {:>9} {:>9} {:>12} {:>9}", "position error, rms mm", "before", "after",
-                         "noise alone", "gap"));
-  line("fitted rows", d.error_before, d.error_after, d.noise_floor_m);
-  if (others) line("held-out rows", others->before, others->after, others->noise_floor_m);
-  common.say(fmt::format("  chi-square per degree of freedom {:.3g} before, {:.3g} after",
-                         d.chi2_per_dof_before, d.chi2_per_dof_after));
-}
 
 /// \return whether there was anything to tell apart
 bool Diagnose::write_plan(const Diagnosis& d, const Robot& robot_file) const {
@@ -147,8 +103,8 @@ void Diagnose::run() const {
   const bool planned = !plan.empty() && write_plan(d, robot_file);
 
   common.say(verdict_sentence(d));
-  say_effects(d, robot_file);
-  say_gap(d, others);
+  for (const std::string& line : effect_lines(d, robot_file)) common.say(line);
+  for (const std::string& line : gap_lines(d, others)) common.say(line);
   for (const std::string& note : d.notes) common.say("  note: " + note);
   common.say(fmt::format("{}: written", out));
   if (planned)
@@ -161,10 +117,7 @@ void Diagnose::run() const {
   for (const std::string& step : next_steps(d, out, planned ? plan : "")) common.say("  next: " + step);
 
   common.write_json(to_json(d, rows, others, robot_file));
-  if (!report.empty()) {
-    write_file(report, html(page_of(d, rows, robot_file, data, others)));
-    common.say(report + ": written");
-  }
+  common.write_report(report, [&] { return page_of(d, rows, robot_file, data, others); });
   if (!d.doubts.empty()) throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, joined(d.doubts)));
 }
 

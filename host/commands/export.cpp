@@ -60,7 +60,7 @@ void Export::run() const {
 void Export::c_header() const {
   need(robot, "--robot");
   const Robot file = load_robot(robot);
-  write_file(out, robot_header(file));
+  write_file(out, robot_header(file, "\"flexcomp export\""));
   const std::string hash = hex(nominal_hash(file.nominal));
   common.say(fmt::format("{}: nominal robot {} as the C constant {}, nominal hash {}…", out, file.name,
                          c_identifier(file.name), hash.substr(0, 12)));

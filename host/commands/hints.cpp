@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <string_view>
 
@@ -43,73 +44,160 @@ std::string nearest_file(const std::string& path) {
   return near.empty() ? "" : (wanted.has_parent_path() ? (wanted.parent_path() / near).string() : near);
 }
 
-std::string of_input(const InputError& e, const std::string& command) {
-  const auto expects = [&e](std::string_view text) { return e.expected().find(text) != std::string::npos; };
-  if (expects("a file that can be read") && e.found() == "none") {
-    const std::string near = nearest_file(e.file());
-    return near.empty() ? "" : fmt::format("there is {}", near);
-  }
-  if (expects("this column (") && command != "import" && !e.file().ends_with(".yaml")) {
-    return "\"flexcomp import --joints LOG.csv\" makes a data file of an instrument's export and a robot's "
-           "log";
-  }
-  if (command == "import" && e.expected().starts_with("XML") && !e.file().ends_with(".urdf") && !e.file().ends_with(".xml"))
-    return "an instrument's points become data with --joints LOG.csv --robot ROBOT.yaml";
-  if (expects("points that are also in"))
-    return "--names takes the points' names apart, as --names '*::{pose}_{reflector}'; --join order asks for "
-           "none";
-  if (expects("look like radians") || e.found().find("look like radians") != std::string::npos)
-    return "\"flexcomp import --joint-unit rad\" reads a log in radians";
-  return {};
+/// What the terminal adds to an error by its code. "{}" stands for the library's text, which stays where there is nothing.
+struct Wording {
+  ErrorCode code;
+  std::string_view place;  ///< option in place of the file
+  std::string_view field;  ///< option in place of the field
+  std::string_view expected;
+  std::string_view found;
+};
+
+constexpr std::string_view which_columns = "{} (--columns says which)";
+constexpr std::string_view force_goes_on = "{} --force goes on all the same";
+constexpr auto wordings = std::to_array<Wording>({
+    {ErrorCode::looks_like_radians, "", "", "", "{} (--force takes them as degrees)"},
+    {ErrorCode::long_links, "", "",
+     "{}; 'flexcomp import' of this file gives the same arm with beta_deg in their place", ""},
+    {ErrorCode::unnamed_effect, "", "", "{} (--allow-unnamed pushes the others too)", ""},
+    {ErrorCode::unreachable_pose, "", "", "{} (--frame says where F0 is)", ""},
+    {ErrorCode::several_branches, "", "", "--start q1,…,q6, {}", ""},
+    {ErrorCode::no_reflectors, "", "", "{} for --measure reflectors", ""},
+    {ErrorCode::search_state, "", "", "a state that `plan --state` wrote", ""},
+    {ErrorCode::too_few_poses, "", "--poses", "", ""},
+    {ErrorCode::fixed_parameter, "--fix", "", "", ""},
+    {ErrorCode::implausible_data, "", "", "", force_goes_on},
+    {ErrorCode::distant_base, "", "", "", "{}; --frames fit lets the measurement frame lie anywhere"},
+    {ErrorCode::held_out_was_fitted, "", "--holdout", "{}: held-out rows must not be those of --data", ""},
+    {ErrorCode::no_result_file, "", "", "{} of identify --json or validate --json", ""},
+    {ErrorCode::another_arm, "", "", "",
+     "{}, or other --base and --tip (flexcomp import makes a robot file of this URDF)"},
+    {ErrorCode::ambiguous_dialect, "", "", "{} (--delimiter and --decimal say which)", ""},
+    {ErrorCode::ambiguous_decimal_mark, "", "", "--decimal comma, or {}", ""},
+    {ErrorCode::several_orientations, "", "", "", "{} (--columns chooses)"},
+    {ErrorCode::ambiguous_column, "", "", which_columns, ""},
+    {ErrorCode::unknown_layout, "", "", "{} or --columns (such as name,x,y,z,sigma,-)", ""},
+    {ErrorCode::no_length_unit, "", "", "{} or by --unit", ""},
+    {ErrorCode::no_angle_unit, "", "", "{} or by --angle-unit", ""},
+    {ErrorCode::no_angle_convention, "", "",
+     "{}: --angles fixed-xyz (SpatialAnalyzer), moving-xyz (Stäubli) or rotation-vector", ""},
+    {ErrorCode::log_without_joints, "", "", "{}, or --joint-columns or --map", ""},
+    {ErrorCode::ambiguous_joint_column, "", "", "{} (--map or --joint-columns says which)", ""},
+    {ErrorCode::ambiguous_time_column, "", "", "{} (--map says which)", ""},
+    {ErrorCode::ambiguous_log_decimal_mark, "", "", "decimal: in --map, or {}", ""},
+    {ErrorCode::ambiguous_name_column, "", "", "{} (name: in --map says which)", ""},
+    {ErrorCode::no_joint_unit, "", "", "{} or by --joint-unit", ""},
+    {ErrorCode::no_names, "", "--join name", "", "{} (--join order or time)"},
+    {ErrorCode::repeated_point, "", "",
+     "{} (--repeats: the pose was measured again; --names: what in the name is the pose)", ""},
+    {ErrorCode::moving_arm, "", "", "{}, or a smaller --tolerance", ""},
+});
+
+/// The options behind the arguments of library calls.
+constexpr std::array<std::array<std::string_view, 2>, 10> argument_options{{{"base", "--base"},
+                                                                            {"tip", "--tip"},
+                                                                            {"flange", "--flange"},
+                                                                            {"columns", "--columns"},
+                                                                            {"angles", "--angles"},
+                                                                            {"angle_unit", "--angle-unit"},
+                                                                            {"coverage", "--coverage"},
+                                                                            {"names", "--names"},
+                                                                            {"by_order", "--join order"},
+                                                                            {"by_time", "--join time"}}};
+
+std::string filled(std::string_view pattern, const std::string& text) {
+  std::string out(pattern.empty() ? std::string_view("{}") : pattern);
+  if (const auto at = out.find("{}"); at != std::string::npos) out.replace(at, 2, text);
+  return out;
 }
 
-std::string of_bus(const std::string& message, bool silent) {
-  const std::string_view text = message;
-  const std::string where(text.substr(0, text.find(": ")));
-  if (!silent) {
-    const bool bus = text.starts_with("can:") || text.starts_with("modbus-");
-    return bus ? fmt::format("\"flexcomp status --of {}\" says what this controller is, holds and does",
-                             where)
-               : "";
+Wording wording_of(ErrorCode code) {
+  const auto at =
+      std::find_if(wordings.begin(), wordings.end(), [code](const Wording& w) { return w.code == code; });
+  return at == wordings.end() ? Wording{} : *at;
+}
+
+std::string option_of(const InputError& e) {
+  if (e.code() != ErrorCode::argument) return filled(wording_of(e.code()).field, e.field());
+  for (const auto& [argument, option] : argument_options) {
+    if (argument == e.field()) return std::string(option);
   }
-  if (text.starts_with("can:")) {
-    if (text.find("no CAN sockets") != std::string_view::npos)
-      return "\"modprobe can_raw\" loads the kernel's CAN, where it has one; \"hil/with-vcan COMMAND\" gives "
-             "any machine a bus to try";
-    const std::string interface = where.substr(4, where.find(':', 4) - 4);
+  return e.field();
+}
+
+std::string of_input(const InputError& e, const std::string& command) {
+  switch (e.code()) {
+    case ErrorCode::no_such_file: {
+      const std::string near = nearest_file(e.file());
+      return near.empty() ? "" : fmt::format("there is {}", near);
+    }
+    case ErrorCode::missing_column:
+      if (command == "import") return {};
+      return "\"flexcomp import --joints LOG.csv\" makes a data file of an instrument's export and a robot's "
+             "log";
+    case ErrorCode::not_xml:
+      if (command != "import" || e.file().ends_with(".urdf") || e.file().ends_with(".xml")) return {};
+      return "an instrument's points become data with --joints LOG.csv --robot ROBOT.yaml";
+    case ErrorCode::no_common_points:
+      return "--names takes the points' names apart, as --names '*::{pose}_{reflector}'; --join order asks "
+             "for none";
+    case ErrorCode::looks_like_radians:
+      return "\"flexcomp import --joint-unit rad\" reads a log in radians";
+    default:
+      return {};
+  }
+}
+
+std::string of_bus(const BusError& e) {
+  const std::string& where = e.address();
+  // Who cannot be reached cannot be asked for its status either.
+  const bool silent = dynamic_cast<const NoAnswer*>(&e) != nullptr || e.code() == ErrorCode::no_can_sockets ||
+                      e.code() == ErrorCode::bus_not_opened;
+  if (!silent) {
+    return fmt::format("\"flexcomp status --of {}\" says what this controller is, holds and does", where);
+  }
+  if (e.code() == ErrorCode::no_can_sockets)
+    return "\"modprobe can_raw\" loads the kernel's CAN, where it has one; \"hil/with-vcan COMMAND\" gives "
+           "any "
+           "machine a bus to try";
+  if (where.starts_with("can:")) {
     return fmt::format(
         "\"ip -details link show {}\" says whether the interface is up and at which bit rate; then check the "
         "node's number, wiring and power",
-        interface);
+        where.substr(4, where.find(':', 4) - 4));
   }
-  if (text.starts_with("modbus-rtu:"))
+  if (where.starts_with("modbus-rtu:"))
     return "check device, baud rate, parity and unit (modbus-rtu:DEVICE:BAUD:PARITY:UNIT); --timeout waits "
            "longer";
-  if (text.starts_with("modbus-tcp:"))
-    return "check that the controller is on and reachable, its port and unit (modbus-tcp:HOST:PORT:UNIT); "
-           "--timeout waits longer";
-  return {};
+  return "check that the controller is on and reachable, its port and unit (modbus-tcp:HOST:PORT:UNIT); "
+         "--timeout waits longer";
 }
 
 }  // namespace
 
+std::string message(const std::exception& error) {
+  if (const auto* e = dynamic_cast<const InputError*>(&error)) {
+    const Wording w = wording_of(e->code());
+    return InputError(filled(w.place, e->file()), e->line(), option_of(*e), filled(w.expected, e->expected()),
+                      filled(w.found, e->found()))
+        .what();
+  }
+  const auto* bus = dynamic_cast<const BusError*>(&error);
+  if (bus != nullptr && bus->code() == ErrorCode::unknown_robot)
+    return fmt::format("{}: give its file with --robot", error.what());
+  return error.what();
+}
+
+CLI::ValidationError usage_error(const ArgumentError& e) {
+  return CLI::ValidationError(std::string(wording_of(e.code()).field), e.what());
+}
+
 std::string hint(const std::exception& error, const std::string& command) {
   if (const auto* input = dynamic_cast<const InputError*>(&error)) return of_input(*input, command);
-  if (dynamic_cast<const BusError*>(&error) != nullptr) {
-    const std::string message = error.what();
-    const bool refused = dynamic_cast<const RefusedByController*>(&error) != nullptr;
-    // Who cannot be reached cannot be asked for its status either.
-    const bool silent = !refused && (dynamic_cast<const NoAnswer*>(&error) != nullptr ||
-                                     message.find("cannot be opened") != std::string::npos ||
-                                     message.find("connect") != std::string::npos ||
-                                     message.find("CAN sockets") != std::string::npos ||
-                                     message.find("interface") != std::string::npos);
-    return of_bus(message, silent);
-  }
-  if (dynamic_cast<const DoubtfulResult*>(&error) != nullptr &&
-      std::string_view(error.what()).find("chi-square") != std::string_view::npos) {
+  if (const auto* bus = dynamic_cast<const BusError*>(&error)) return of_bus(*bus);
+  const auto* doubtful = dynamic_cast<const DoubtfulResult*>(&error);
+  if (doubtful != nullptr && doubtful->code() == ErrorCode::improbable_chi_square)
     return "\"flexcomp diagnose\" with the same robot and data looks for the effect that the model lacks";
-  }
   return {};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// After what went wrong: what to do next.
+/// Errors as the terminal shows them: with the options that are concerned, and what to do next.
 #ifndef FLEXCOMP_HOST_COMMANDS_HINTS_HPP
 #define FLEXCOMP_HOST_COMMANDS_HINTS_HPP
 
@@ -9,7 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "errors.hpp"
+
 namespace flexcomp::host {
+
+/// The message of an error, completed by the options that its code concerns.
+std::string message(const std::exception& error);
+/// The same for an argument that does not suit: as if the option were wrong.
+CLI::ValidationError usage_error(const ArgumentError& error);
 
 /// One line without full stop, or empty where the message says all that can be said. `command` is the one that failed: what
 /// it does itself is no advice.

@@ -4,17 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "commands/numbers.hpp"
 #include "exchange/declared_unit.hpp"
-#include "exchange/joining.hpp"
+#include "exchange/joined_data.hpp"
 #include "exchange/point_list.hpp"
 #include "exchange/robot_log.hpp"
 #include "files/data_file.hpp"
@@ -33,9 +28,6 @@ const std::map<std::string, AngleConvention> angle_names{
     {"fixed-xyz", AngleConvention::fixed_xyz},
     {"moving-xyz", AngleConvention::moving_xyz},
     {"rotation-vector", AngleConvention::rotation_vector}};
-const std::map<std::string, JoinBy> join_names{
-    {"name", JoinBy::name}, {"order", JoinBy::order}, {"time", JoinBy::time}};
-
 template <class Value>
 std::vector<std::string> keys_of(const std::map<std::string, Value>& names) {
   std::vector<std::string> keys;
@@ -46,41 +38,6 @@ std::vector<std::string> keys_of(const std::map<std::string, Value>& names) {
 template <class Value>
 std::optional<Value> chosen(const std::map<std::string, Value>& names, const std::string& text) {
   return text.empty() ? std::optional<Value>() : std::optional<Value>(names.at(text));
-}
-
-/// Asks the reader of data files about the text; what it refuses is said with the line of the file that it came from.
-std::vector<std::string> checked(const std::string& text, const std::string& out, const Robot& robot,
-                                 const PointList& points, const RobotLog& log, const Joining& joining,
-                                 bool force) {
-  std::string folder = (std::filesystem::temp_directory_path() / "flexcomp-XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr)
-    throw std::runtime_error(fmt::format("{}: cannot be made: {}", folder, std::strerror(errno)));
-  struct Remove {
-    const std::string& folder;
-    ~Remove() {
-      std::error_code ignored;
-      std::filesystem::remove_all(folder, ignored);
-    }
-  } remove{folder};
-  const std::string path = folder + "/data.csv";
-  write_file(path, text);
-  try {
-    std::vector<std::string> warnings = load_data(path, robot, {force}).warnings;
-    for (std::string& w : warnings) {
-      if (w.starts_with(path)) w.replace(0, path.size(), out);
-    }
-    return warnings;
-  } catch (const InputError& e) {
-    std::vector<std::string> of_log = joint_and_context_names(joining.data.columns);
-    of_log.insert(of_log.end(), log.context.begin(), log.context.end());
-    // The field may be several columns, "q1_deg … q6_deg".
-    const bool measured = !e.field().empty() &&
-                          std::none_of(of_log.begin(), of_log.end(),
-                                       [&e](const std::string& name) { return e.field().starts_with(name); });
-    const std::vector<std::size_t>& lines = measured ? joining.point_lines : joining.log_lines;
-    const std::size_t line = e.line() < 2 ? 0 : lines[e.line() - 2];
-    throw InputError(measured ? points.path : log.path, line, e.field(), e.expected(), e.found());
-  }
 }
 
 void list(const CommonOptions& common, const std::string& what, const std::vector<std::string>& lonely) {
@@ -153,8 +110,7 @@ void ImportMeasurements::add_to(CLI::App& command) {
                            "With --join time: what to add to the instrument's times [s]"))
       ->check(finite_number())
       ->capture_default_str();
-  group(command.add_flag("--force", force,
-                         "Go on where input is only suspicious (readings that look like radians)"));
+  group(add_force_option(command, force));
 }
 
 void ImportMeasurements::refuse_idle() const {
@@ -184,16 +140,17 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   refuse_idle();
   const Robot robot_file = load_robot(robot);
   LogMap how = map.empty() ? LogMap() : load_log_map(map);
-  if (!joint_unit.empty()) how.joint_unit = angle_unit_of(joint_unit);
+  if (!joint_unit.empty()) how.joint_unit = {angle_unit_of(joint_unit), "--joint-unit"};
   if (!joint_columns.empty()) {
+    how.columns_by = "--joint-columns";
     how.joints.emplace();
     for (std::size_t j = 0; j < joint_count; ++j) (*how.joints)[j].column = joint_columns[j];
   }
   PointListOptions reading;
   reading.dialect = {chosen(delimiter_names, delimiter), chosen(decimal_names, decimal)};
   reading.columns = columns;
-  if (!unit.empty()) reading.length = length_unit_of(unit);
-  if (!angle_unit.empty()) reading.angle = angle_unit_of(angle_unit);
+  if (!unit.empty()) reading.length = {length_unit_of(unit), "--unit"};
+  if (!angle_unit.empty()) reading.angle = {angle_unit_of(angle_unit), "--angle-unit"};
   reading.angles = chosen(angle_names, angles);
   reading.coverage = coverage;
   const PointList points = read_point_list(source, reading);
@@ -212,14 +169,12 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
   joining_options.shift_s = shift_s;
   const Joining joining = join(points, log, joining_options);
   const std::string text = data_text(joining.data);
-  common.warn(checked(text, out, robot_file, points, log, joining, force));
+  common.warn(check_joined(text, out, robot_file, points, log, joining, force));
   write_file(out, text);
 
-  const char* const kind = joining.data.kind == MeasurementKind::reflectors ? "reflector points"
-                           : joining.data.kind == MeasurementKind::pose     ? "full poses"
-                                                                            : "positions";
-  common.say(fmt::format("{}: {} rows, {} of {} joined with {} by {}", out, joining.data.rows.size(), kind,
-                         source, joints, by.empty() ? "name" : by));
+  common.say(fmt::format("{}: {} rows, {} of {} joined with {} by {}", out, joining.data.rows.size(),
+                         measured_name(joining.data.kind), source, joints,
+                         name_in(join_names, joining_options.by)));
   common.say(fmt::format(
       "  {}: {} points in {}, fields separated by {}{}", source, points.points.size(), points.length.name,
       words(points.dialect),
@@ -230,21 +185,9 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
                   log.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(log.unused, ", "))));
   list(common, fmt::format("points of {} without joint readings, left out", source), joining.lonely_points);
   list(common, fmt::format("rows of {} at which nothing was measured", joints), joining.lonely_rows);
-  common.write_json({{"output", out},
-                     {"rows", joining.data.rows.size()},
-                     {"measured", kind},
-                     {"join", by.empty() ? "name" : by},
-                     {"points", points.points.size()},
-                     {"log_rows", log.rows.size()},
-                     {"unit", points.length.name},
-                     {"dialect", words(points.dialect)},
-                     {"log_dialect", words(log.dialect)},
-                     {"joint_columns", log.joint_columns},
-                     {"sigma", points.sigmas},
-                     {"points_without_joints", joining.lonely_points},
-                     {"joints_without_point", joining.lonely_rows},
-                     {"columns_not_read", points.unused},
-                     {"log_columns_not_read", log.unused}});
+  nlohmann::ordered_json result{{"output", out}};
+  result.update(to_json(joining, points, log, joining_options.by));
+  common.write_json(result);
 }
 
 }  // namespace flexcomp::host

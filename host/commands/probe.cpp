@@ -70,9 +70,10 @@ void Probe::run() const {
       const wire::ProbeResponse response = client->probe(request_of(commands[k], list.rows[k].context));
       if (k != 0 && response.sequence != sequence) {
         throw BusError(
-            fmt::format("{}: the controller changed from set {} to set {} after {} of {} targets; nothing "
+            client->where(),
+            fmt::format("the controller changed from set {} to set {} after {} of {} targets; nothing "
                         "was written",
-                        client->where(), sequence, response.sequence, k, commands.size()));
+                        sequence, response.sequence, k, commands.size()));
       }
       sequence = response.sequence;
       Answer answer;

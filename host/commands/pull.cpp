@@ -39,15 +39,10 @@ struct Pull {
     result["sequence"] = sequence;
     if (!out.empty()) {
       const Robot from_robot = robot_of(*client, robot);
-      try {
-        Calibration calibration = calibration_from_image(bytes, from_robot, client->where());
-        stamp(calibration, from_robot);
-        save_calibration(out, calibration, from_robot);
-        result["terms"] = calibration.terms.terms.size();
-      } catch (const InputError& e) {
-        // The bytes came from the controller: it is no file of the user's that is refused.
-        throw BusError(e.what());
-      }
+      Calibration calibration = calibration_held(*client, bytes, from_robot);
+      stamp(calibration, from_robot);
+      save_calibration(out, calibration, from_robot);
+      result["terms"] = calibration.terms.terms.size();
     }
     bus.say(fmt::format("{}: set {}, {} bytes, written to {}", client->where(), sequence, bytes.size(),
                         out.empty() ? image : out));

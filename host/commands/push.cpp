@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/format.h>
-#include <unistd.h>
+#include "commands/push.hpp"
 
+#include <fmt/format.h>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -11,168 +11,20 @@
 #include <string>
 #include <vector>
 
-#include "bus/transfer.hpp"
-#include "commands/bus_options.hpp"
-#include "commands/colour.hpp"
 #include "commands/commands.hpp"
 #include "commands/numbers.hpp"
 #include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
-#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"
 #include "model/parameter_image.hpp"
-#include "model/set_difference.hpp"
-#include "units.hpp"
 
 namespace flexcomp::host {
-namespace {
 
-struct Push {
-  BusOptions bus;
-  std::string set;
-  std::string robot;
-  std::string image;
-  std::optional<std::uint32_t> sequence;
-  std::optional<double> trial_s;
-  bool confirm = false;
-  bool allow_unnamed = false;
-  bool dry_run = false;
-  std::string against;
-  const CLI::Option* to = nullptr;
-
-  void run() const;
-  Bytes make(ControllerClient& client, std::vector<std::string>& left_out) const;
-  void show_changes() const;
-};
-
-/// The tool is looked at in so many poses.
-constexpr std::size_t dry_run_poses = 500;
-
-/// A set of parameters as a controller holds it, from a file: a calibration, or an image.
-TermSet held_set(const std::string& path, const Robot& robot, const ImageOptions& options) {
-  const std::optional<Bytes> image = read_image_file(path);
-  const Bytes bytes = image ? *image : make_image(load_calibration(path, robot), robot, 1, options);
-  return calibration_from_image(bytes, robot, path).terms;
-}
-
-std::string difference_table(const SetDifference& d) {
-  std::string text;
-  if (!d.changes.empty()) {
-    text += painted(fmt::format("  {:<40} {:>12} {:>14} {:>11} {:>11}", "parameter", "old", "new", "tool mm",
-                                "tool deg"),
-                    Colour::head, STDOUT_FILENO) +
-            "\n";
-  }
-  for (const ParameterChange& c : d.changes) {
-    const auto shown = [&c](double si) { return fmt::format("{:.6g}", si / c.unit.si_per_file_unit()); };
-    text += fmt::format("  {:<40} {:>12} -> {:>11} {:>11.4f} {:>11.5f}\n", c.name, shown(c.before),
-                        shown(c.after), c.at_tool.largest_m * 1e3, degrees(c.at_tool.largest_rad));
-  }
-  text += fmt::format("  {} change, {} stay as they are", d.changes.size(), d.unchanged);
-  if (!d.changes.empty()) {
-    text += fmt::format(
-        "\n  at the tool: {} on average, up to {:.4f} mm and {:.5f} deg (over {} random poses; beside a "
-        "parameter: its own part, at most)",
-        painted(fmt::format("{:.4f} mm", d.at_tool.mean_m * 1e3), Colour::note, STDOUT_FILENO),
-        d.at_tool.largest_m * 1e3, degrees(d.at_tool.largest_rad), d.poses);
-  }
-  return text;
-}
-
-/// Reads and compares; not one byte is written to the controller.
-void Push::show_changes() const {
-  nlohmann::ordered_json result{{"dry_run", true}};
-  std::vector<std::string> left_out;
-  Robot for_robot;
-  TermSet now;
-  TermSet next;
-  if (against.empty()) {
-    const std::optional<Bytes> ready = read_image_file(set);
-    const std::unique_ptr<ControllerClient> client = bus.connect();
-    for_robot = robot_of(*client, robot);
-    const Bytes bytes = ready ? *ready : make(*client, left_out);
-    // A file that is no image is the file's fault; what a sound one asks for may be beyond the controller.
-    next = calibration_from_image(bytes, for_robot, set).terms;
-    const std::vector<std::string> beyond = beyond_capability(client->capability(), bytes);
-    if (!beyond.empty()) {
-      throw BusError(fmt::format("{}: {} is more than this controller can do: {}; nothing was sent",
-                                 client->where(), set, fmt::join(beyond, "; ")));
-    }
-    const wire::Status status = client->status();
-    Bytes active;
-    if (status.active_slot != wire::no_slot) {
-      ProgressBar bar("reading the active set", bus.quiet);
-      active = client->active_image(bar.callback());
-    }
-    if (!active.empty()) {
-      try {
-        now = calibration_from_image(active, for_robot, client->where()).terms;
-      } catch (const InputError& e) {
-        throw BusError(e.what());
-      }
-    }
-    const std::string before =
-        active.empty() ? "no set, commands pass through" : fmt::format("set {}", status.active_sequence);
-    bus.say(fmt::format("{}: holds {}; {} would be sent ({} bytes). Nothing was sent.", client->where(),
-                        before, set, bytes.size()));
-    result["bus"] = client->where();
-    result["sequence"] = active.empty() ? 0U : status.active_sequence;
-    result["bytes"] = bytes.size();
-  } else {
-    if (robot.empty()) throw CLI::RequiredError("--robot (with --against)");
-    for_robot = load_robot(robot);
-    ImageOptions options;
-    options.allow_unnamed = allow_unnamed;
-    now = held_set(against, for_robot, options);
-    next = held_set(set, for_robot, options);
-    bus.say(fmt::format("{}: would take the place of {}. Nothing was sent.", set, against));
-    result["against"] = against;
-  }
-  const SetDifference d = difference(now, next, for_robot, dry_run_poses);
-  if (!left_out.empty()) {
-    bus.say(
-        fmt::format("{}: left out, for they belong to the measurement: {}", set, fmt::join(left_out, ", ")));
-  }
-  bus.say(difference_table(d));
-  result["left_out"] = left_out;
-  result["unchanged"] = d.unchanged;
-  result["tool"] = {{"mean_mm", d.at_tool.mean_m * 1e3},
-                    {"largest_mm", d.at_tool.largest_m * 1e3},
-                    {"largest_deg", degrees(d.at_tool.largest_rad)},
-                    {"poses", d.poses}};
-  result["parameters"] = nlohmann::ordered_json::array();
-  for (const ParameterChange& c : d.changes) {
-    result["parameters"].push_back({{"name", c.name},
-                                    {"old", c.before / c.unit.si_per_file_unit()},
-                                    {"new", c.after / c.unit.si_per_file_unit()},
-                                    {"unit", c.unit.name},
-                                    {"tool_mm", c.at_tool.largest_m * 1e3},
-                                    {"tool_deg", degrees(c.at_tool.largest_rad)}});
-  }
-  bus.write_json(result);
-}
-
-Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) const {
-  const Robot for_robot = robot_of(client, robot);
-  const Calibration calibration = load_calibration_for(client, set, for_robot);
-  left_out = never_pushed(calibration, for_robot);
-  ImageOptions options;
-  options.allow_unnamed = allow_unnamed;
-  Bytes out = make_image(calibration, for_robot, sequence ? *sequence : next_sequence(client), options);
-  const std::vector<std::string> beyond = beyond_capability(client.capability(), out);
-  if (!beyond.empty()) {
-    throw BusError(fmt::format("{}: {} is more than this controller can do: {}; nothing was sent",
-                               client.where(), set, fmt::join(beyond, "; ")));
-  }
-  return out;
-}
-
-void Push::run() const {
+void Push::check_options() const {
   refuse_same_file({{"CAL.yaml", set}, {"--robot", robot}, {"--against", against}},
                    {{"--image", image}, {"--json", bus.json}});
-  const auto start = std::chrono::steady_clock::now();
   if (set.empty() != confirm)
     throw CLI::ValidationError("CAL.yaml", "give either a set to push or --confirm");
   if (!against.empty() && !dry_run)
@@ -183,6 +35,27 @@ void Push::run() const {
   if (dry_run && (confirm || trial_s || !image.empty()))
     throw CLI::ValidationError("--dry-run",
                                "sends and writes nothing: no --trial, --confirm or --image with it");
+}
+
+void Push::say_left_out(const std::vector<std::string>& names) const {
+  if (names.empty()) return;
+  bus.say(fmt::format("{}: left out, for they belong to the measurement: {}", set, fmt::join(names, ", ")));
+}
+
+Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) const {
+  const Robot for_robot = robot_of(client, robot);
+  const Calibration calibration = load_calibration_for(client, set, for_robot);
+  left_out = never_pushed(calibration, for_robot);
+  ImageOptions options;
+  options.allow_unnamed = allow_unnamed;
+  Bytes out = make_image(calibration, for_robot, sequence ? *sequence : next_sequence(client), options);
+  refuse_beyond_capability(client, set, out);
+  return out;
+}
+
+void Push::run() const {
+  const auto start = std::chrono::steady_clock::now();
+  check_options();
   if (dry_run) {
     show_changes();
     return;
@@ -202,10 +75,7 @@ void Push::run() const {
 
   std::vector<std::string> left_out;
   const Bytes bytes = ready ? *ready : make(*client, left_out);
-  if (!left_out.empty()) {
-    bus.say(
-        fmt::format("{}: left out, for they belong to the measurement: {}", set, fmt::join(left_out, ", ")));
-  }
+  say_left_out(left_out);
   if (!image.empty()) {
     write_file(image, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
@@ -239,8 +109,6 @@ void Push::run() const {
                       bytes.size(), took.count()));
   bus.write_json(result);
 }
-
-}  // namespace
 
 void add_push(CLI::App& app) {
   auto state = std::make_shared<Push>();

@@ -14,7 +14,6 @@
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "files/write_file.hpp"
 #include "report/page.hpp"
 
 namespace flexcomp::host {
@@ -155,10 +154,7 @@ void StudyCommand::run() const {
   common.say(fmt::format("{}\n  {}\n\n{}", study.title, study.quantity, text_of(table_of(study, ""))));
   for (const std::string& note : study.notes) common.say("  " + note);
   common.write_json(json_of(study, options));
-  if (!report.empty()) {
-    write_file(report, html(page_of(study)));
-    common.say(report + ": written");
-  }
+  common.write_report(report, [&] { return page_of(study); });
 }
 
 }  // namespace

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "identification/validate.hpp"
-#include "commands/outputs.hpp"
-
 #include <fmt/format.h>
 
 #include <memory>
@@ -11,11 +8,13 @@
 #include "commands/accuracy.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
+#include "commands/outputs.hpp"
 #include "errors.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
-#include "files/write_file.hpp"
+#include "identification/identification_json.hpp"
+#include "identification/validate.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"
 
@@ -60,11 +59,13 @@ void Validate::run() const {
                      {"poses", rows.size()},
                      {"chi2_per_dof", v.chi2_per_dof()},
                      {"degrees_of_freedom", v.degrees_of_freedom}});
-  if (!report.empty()) {
-    write_file(report, html(page_of(v, rows, robot_file, set, data)));
-    common.say(report + ": written");
+  common.write_report(report, [&] { return page_of(v, rows, robot_file, set, data); });
+  if (!v.doubts.empty()) {
+    throw DoubtfulResult(fmt::format("{}: {}", calibration, joined(v.doubts)),
+                         chi_square_is_usual(v.chi2, v.degrees_of_freedom)
+                             ? ErrorCode::none
+                             : ErrorCode::improbable_chi_square);
   }
-  if (!v.doubts.empty()) throw DoubtfulResult(fmt::format("{}: {}", calibration, joined(v.doubts)));
 }
 
 }  // namespace

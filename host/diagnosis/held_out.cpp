@@ -60,24 +60,25 @@ HeldOut held_out(const Robot& robot, const Diagnosis& d, const std::vector<Obser
         source, 0, "x_mm y_mm z_mm",
         fmt::format("rows in the same measurement frame as those that were fitted ({:.3g} mm off, rms)",
                     d.error_before.rms_m * 1e3),
-        fmt::format("{:.1f} mm (rms): was the instrument moved? --force goes on all the same",
-                    out.before.rms_m * 1e3));
+        fmt::format("{:.1f} mm (rms): was the instrument moved?", out.before.rms_m * 1e3),
+        ErrorCode::implausible_data);
   }
   return out;
 }
 
 void refuse_the_fitted(const MeasuredData& fitted, const MeasuredData& other) {
-  const char* const expected = "poses that were not fitted: held-out rows must not be those of --data";
+  const char* const expected = "poses that were not fitted";
   std::error_code unknown;
   if (fitted.path == other.path || std::filesystem::equivalent(fitted.path, other.path, unknown))
-    throw InputError(other.path, 0, "--holdout", expected, "the same file");
+    throw InputError(other.path, 0, "", expected, "the same file", ErrorCode::held_out_was_fitted);
   std::map<std::array<double, 25>, std::size_t> lines;
   for (const Measurement& m : fitted.rows) lines.emplace(readings(m), m.line);
   for (const Measurement& m : other.rows) {
     const auto same = lines.find(readings(m));
     if (same != lines.end())
-      throw InputError(other.path, m.line, "--holdout", expected,
-                       fmt::format("the measurement of {}:{}", fitted.path, same->second));
+      throw InputError(other.path, m.line, "", expected,
+                       fmt::format("the measurement of {}:{}", fitted.path, same->second),
+                       ErrorCode::held_out_was_fitted);
   }
 }
 

@@ -33,15 +33,6 @@ std::string for_mechanics(const std::string& key, double value, double sigma) {
   return "";
 }
 
-std::string list_of(const std::vector<std::string>& items) {
-  std::string text;
-  for (std::size_t k = 0; k < items.size(); ++k) {
-    text += items[k];
-    if (k + 1 < items.size()) text += k + 2 == items.size() ? " and " : ", ";
-  }
-  return text;
-}
-
 /// The size of a harmonic as one number: sine and cosine are of no interest to who looks for a bad gear.
 std::string amplitude(const FoundEffect& effect) {
   const auto& c = effect.coefficients;
@@ -72,6 +63,15 @@ std::string curve_size(const KeyedCoefficients& c) {
 }
 
 }  // namespace
+
+std::string list_of(const std::vector<std::string>& items) {
+  std::string text;
+  for (std::size_t k = 0; k < items.size(); ++k) {
+    text += items[k];
+    if (k + 1 < items.size()) text += k + 2 == items.size() ? " and " : ", ";
+  }
+  return text;
+}
 
 std::string in_words(const EffectId& id) {
   const auto sentence = descriptor(id.effect).sentence;
@@ -186,50 +186,6 @@ std::vector<EffectId> unnamed_effects(const Diagnosis& d, const Robot& robot) {
     if (group.id.effect == Effect::unnamed) ids.push_back(group.id);
   }
   return ids;
-}
-
-std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calibration,
-                                    const std::string& plan) {
-  std::vector<std::string> steps;
-  std::vector<std::string> measurement;
-  bool confounded = false;
-  for (const FoundEffect& e : d.effects) {
-    if (!e.pushed) measurement.push_back(name(e.id));
-    confounded = confounded || !e.confounded_with.empty();
-  }
-  if (!d.doubts.empty()) {
-    steps.push_back(fmt::format("{} is not to be pushed: see why below", calibration));
-  } else if (std::any_of(d.after.terms.terms.begin(), d.after.terms.terms.end(),
-                         [](const Term<double>& t) { return t.effect == Effect::unnamed; })) {
-    steps.push_back(
-        fmt::format("into the controller: flexcomp push --to BUS {} --allow-unnamed (an effect that nobody "
-                    "understands is pushed only if you say so)",
-                    calibration));
-  } else {
-    steps.push_back(fmt::format("into the controller: flexcomp push --to BUS {}", calibration));
-  }
-  if (!measurement.empty()) {
-    steps.push_back(fmt::format(
-        "{} {} to the measurement, not to the arm: predict and validate use {}, push leaves {} out",
-        list_of(measurement), measurement.size() == 1 ? "belongs" : "belong",
-        measurement.size() == 1 ? "it" : "them", measurement.size() == 1 ? "it" : "them"));
-  }
-  if (confounded && !d.discriminating_poses.empty()) {
-    steps.push_back(plan.empty()
-                        ? "to tell the rivals apart: --plan POSES.csv writes the poses that do; measure them "
-                          "and diagnose all rows together"
-                        : fmt::format("to tell the rivals apart: measure the poses of {} and diagnose all "
-                                      "rows together",
-                                      plan));
-  } else if (confounded) {
-    steps.emplace_back(
-        "no poses were found that tell the rivals apart: their corrections are the same, either will do");
-  }
-  if (!d.not_testable.empty()) {
-    steps.emplace_back(
-        "to have the untested effects tested too: record the columns that they need, and let them vary");
-  }
-  return steps;
 }
 
 double gap_of(double rms_m, double noise_floor_m) {

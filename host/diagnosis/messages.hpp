@@ -17,6 +17,9 @@ std::string in_words(const EffectId& id);
 /// The verdict in one plain sentence.
 std::string verdict_sentence(const Diagnosis& d);
 
+/// "a, b and c".
+std::string list_of(const std::vector<std::string>& items);
+
 /// Where the model fails, and what the failure follows.
 std::string where_sentence(const Misfit& where);
 
@@ -40,11 +43,6 @@ std::string not_testable_text(const NotTestable& n);
 
 /// The calibration's effects that nobody has named, as they stand in `after`.
 std::vector<EffectId> unnamed_effects(const Diagnosis& d, const Robot& robot);
-
-/// What to do now. \param calibration  where the calibration was written \param plan  where the telling poses were
-/// written; empty: nowhere
-std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calibration,
-                                    const std::string& plan);
 
 /// sqrt(max(0, rms^2 - floor^2)): what is left of an error when the noise is taken away.
 double gap_of(double rms_m, double noise_floor_m);

@@ -143,10 +143,8 @@ CorrectedUrdf correct_urdf(const std::string& path, const UrdfLinks& links, cons
     throw InputError(
         path, 0, fmt::format("joint '{}'", arm.joints[i].name),
         fmt::format("the axis of joint {} of {}", i + 1, robot.path),
-        fmt::format(
-            "one that is {:.3g} mm and {:.3g} deg off: another arm, or other --base and --tip (flexcomp "
-            "import makes a robot file of this URDF)",
-            moved * 1e3, degrees(turned)));
+        fmt::format("one that is {:.3g} mm and {:.3g} deg off: another arm", moved * 1e3, degrees(turned)),
+        ErrorCode::another_arm);
   }
 
   // Frames of the drawing and of ours at zero; between them what stays constant.

@@ -40,7 +40,7 @@ ColumnName column_name(std::string_view cell);
 /// Something that says in which unit a column is.
 struct UnitSource {
   std::optional<Unit> unit;  ///< nothing where it says nothing
-  std::string by;            ///< "line 3", "the column's name", "--unit"
+  std::string by;            ///< "line 3", "the column's name"
 };
 
 /// The unit on which all that say one agree: of two that differ neither wins. Nothing where nobody says one.

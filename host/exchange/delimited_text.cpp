@@ -224,7 +224,7 @@ bool is_number(std::string_view text) {
 }
 
 void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, const std::optional<char>& given,
-                                   const std::vector<std::size_t>& small, const char* how) {
+                                   const std::vector<std::size_t>& small, ErrorCode ambiguous) {
   if (given) {
     dialect.decimal = *given;
     return;
@@ -261,10 +261,8 @@ void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, cons
   if (seen != 0 && !sure) {
     throw InputError(
         path, first_line, column_label(first_column),
-        fmt::format("a number whose comma is a decimal comma for sure, or {} (comma); commas that part "
-                    "thousands are not read",
-                    how),
-        "'" + first_cell + "'");
+        "a number whose comma is certainly a decimal comma; commas that separate thousands are not read",
+        "'" + first_cell + "'", ambiguous);
   }
   if (seen != 0) dialect.decimal = seen;
 }
@@ -366,9 +364,9 @@ void read_without_header(DelimitedText& out, const std::vector<Line>& lines, con
       readable = std::max(readable, rows.rows.size());
       if (rows.rows.size() != table.size()) continue;
       if (found && !same_cells(*found, rows)) {
-        throw InputError(out.path, table.front().number, "",
-                         "one way to part the fields (--delimiter and --decimal say which)",
-                         fmt::format("{} as well as {}", words(found->dialect), words(rows.dialect)));
+        throw InputError(out.path, table.front().number, "", "one way to separate the fields",
+                         fmt::format("{} as well as {}", words(found->dialect), words(rows.dialect)),
+                         ErrorCode::ambiguous_dialect);
       }
       if (!found) found = std::move(rows);
     }
@@ -386,7 +384,7 @@ void read_without_header(DelimitedText& out, const std::vector<Line>& lines, con
 }  // namespace
 
 DelimitedText read_delimited(const std::string& path, const DialectChoice& choice, const IsHeader& is_header,
-                             const std::string& header) {
+                             const std::string& header, ErrorCode no_header) {
   const std::string text = decoded(path);
   const std::vector<Line> lines = lines_of(path, text);
   if (lines.empty()) throw InputError(path, 0, "", "a table of measured points or joints", "nothing in it");
@@ -397,7 +395,8 @@ DelimitedText read_delimited(const std::string& path, const DialectChoice& choic
   if (const auto at = find_header(out, lines, tried, is_header)) {
     read_below_header(out, lines, *at);
   } else if (!header.empty()) {
-    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text));
+    throw InputError(path, lines.front().number, "", header, fmt::format("'{}'", lines.front().text),
+                     no_header);
   } else {
     read_without_header(out, lines, tried, choice.decimal);
   }

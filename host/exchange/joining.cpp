@@ -39,9 +39,9 @@ std::string last_part(const std::string& name) {
 }
 
 InputError seen_before(const PointList& list, const ListedPoint& p, const ListedPoint& before,
-                       const char* hint) {
-  return {list.path, p.line, p.name, fmt::format("a point that line {} has not{}", before.line, hint),
-          "the same name again"};
+                       ErrorCode code) {
+  return {list.path, p.line, p.name, fmt::format("a point that line {} has not", before.line),
+          "the same name again", code};
 }
 
 const char* const other_name = ", a name of another kind";
@@ -67,8 +67,7 @@ std::vector<Group> single_points(const PointList& list, const RobotLog& log, boo
     }
     const auto [at, is_new] = seen.emplace(key, &p);
     if (!is_new && !repeats) {
-      throw seen_before(list, p, *at->second,
-                        " (--repeats: the pose was measured again; --names: what in the name is the pose)");
+      throw seen_before(list, p, *at->second, ErrorCode::repeated_point);
     }
     out.push_back({p.name, key, {&p}});
   }
@@ -90,7 +89,7 @@ std::vector<Group> reflector_groups(const PointList& list, const NamePattern& pa
     const auto [at, is_new] = poses.emplace(read->first, std::array<const ListedPoint*, 4>{});
     if (is_new) order.push_back(read->first);
     const ListedPoint*& place = at->second[read->second];
-    if (place != nullptr) throw seen_before(list, p, *place, "");
+    if (place != nullptr) throw seen_before(list, p, *place, ErrorCode::none);
     place = &p;
   }
   std::size_t with_d = 0;
@@ -184,22 +183,21 @@ class Joiner {
       throw InputError(
           list_.path, list_.points.front().line, "",
           fmt::format("points that are also in {} (there: {})", log_.path, shown(log_.rows.front())),
-          fmt::format("none with a partner; the first is {}", shown(list_.points.front())));
+          fmt::format("none with a partner; the first is {}", shown(list_.points.front())),
+          ErrorCode::no_common_points);
     }
     return std::move(out_);
   }
 
  private:
   void by_name() {
-    if (!list_.names)
-      throw InputError(list_.path, 0, "--join name", "a column with names", "none (--join order or time)");
+    if (!list_.names) throw InputError(list_.path, 0, "", "a column with names", "none", ErrorCode::no_names);
     if (!log_.doubtful_names.empty()) {
       throw InputError(log_.path, log_.header_line, log_.doubtful_names[0],
-                       "one column that can be the pose's name (name: in --map says which)",
-                       fmt::format("'{}' as well", log_.doubtful_names[1]));
+                       "one column that can be the pose's name",
+                       fmt::format("'{}' as well", log_.doubtful_names[1]), ErrorCode::ambiguous_name_column);
     }
-    if (!log_.names)
-      throw InputError(log_.path, 0, "--join name", "a column with names", "none (--join order or time)");
+    if (!log_.names) throw InputError(log_.path, 0, "", "a column with names", "none", ErrorCode::no_names);
     std::map<std::string, std::size_t> rows;
     for (std::size_t k = 0; k < log_.rows.size(); ++k) {
       const auto [at, is_new] = rows.emplace(log_.rows[k].name, k);
@@ -221,20 +219,22 @@ class Joiner {
   void by_order() {
     const std::size_t size = std::max<std::size_t>(options_.reflectors, 1);
     if (list_.points.size() != size * log_.rows.size()) {
-      throw InputError(list_.path, 0, "--join order",
+      throw InputError(list_.path, 0, "by_order",
                        size == 1
                            ? fmt::format("{} points, one for each row of {}", log_.rows.size(), log_.path)
                            : fmt::format("{} points, {} for each of the {} rows of {}",
                                          size * log_.rows.size(), size, log_.rows.size(), log_.path),
-                       fmt::format("{}", list_.points.size()));
+                       fmt::format("{}", list_.points.size()), ErrorCode::argument);
     }
     const std::vector<Group> groups = groups_by_order(list_, size);
     for (std::size_t k = 0; k < groups.size(); ++k) add(groups[k], k);
   }
 
   void by_time() {
-    if (!list_.times) throw InputError(list_.path, 0, "--join time", "a column with times", "none");
-    if (!log_.times) throw InputError(log_.path, 0, "--join time", "a column with times", "none");
+    if (!list_.times)
+      throw InputError(list_.path, 0, "by_time", "a column with times", "none", ErrorCode::argument);
+    if (!log_.times)
+      throw InputError(log_.path, 0, "by_time", "a column with times", "none", ErrorCode::argument);
     require_one_clock(list_.path, list_.points, log_.rows.front().time.clock);
     std::vector<std::size_t> order(log_.rows.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -260,11 +260,10 @@ class Joiner {
           if (apart <= options_.still_rad) continue;
           throw InputError(
               list_.path, p.line, p.name,
-              fmt::format(
-                  "an arm that stands still within {:g} s of the measurement, or a smaller --tolerance",
-                  options_.tolerance_s),
+              fmt::format("an arm that stands still within {:g} s of the measurement", options_.tolerance_s),
               fmt::format("joint {} {:.4g} deg apart in lines {} and {} of {}", j + 1, degrees(apart),
-                          log_.rows[first].line, log_.rows[*from].line, log_.path));
+                          log_.rows[first].line, log_.rows[*from].line, log_.path),
+              ErrorCode::moving_arm);
         }
       }
       add({p.name, "", {&p}}, nearest);

@@ -28,7 +28,7 @@ class Krl : public ProgramText {
     for (std::size_t at = 0; at < text_.size(); ++at) at = statement(at);
     refuse_parts_of_moves();
     warn_of_several_tools(tools_);
-    warn_of_several("bases", bases_, "All poses are taken in the one frame of --frame.");
+    warn_of_several("bases", bases_, "All poses are taken in one frame.");
   }
 
  private:

@@ -21,7 +21,7 @@ std::optional<std::size_t> reflector_of(char c) {
 
 NamePattern::NamePattern(const std::string& pattern) {
   const auto refuse = [&pattern](const std::string& expected) {
-    throw InputError("", 0, "--names", expected, "'" + pattern + "'");
+    throw InputError("", 0, "names", expected, "'" + pattern + "'", ErrorCode::argument);
   };
   for (std::size_t k = 0; k < pattern.size();) {
     const auto take = [&](std::string_view word, Kind kind) {

@@ -103,7 +103,7 @@ class PointReader {
       if (role.starts_with('q') || role.starts_with('r') || role == "a" || role == "b" || role == "c")
         small.push_back(column);
     }
-    table_.settle_decimal(numbers, options.dialect.decimal, small, "--decimal");
+    table_.settle_decimal(numbers, options.dialect.decimal, small, ErrorCode::ambiguous_decimal_mark);
   }
 
   PointList read() {
@@ -128,9 +128,9 @@ class PointReader {
     const std::size_t count = table_.rows.front().cells.size();
     if (!options_.columns.empty()) {
       if (options_.columns.size() != count) {
-        throw InputError(table_.path, table_.rows.front().line, "--columns",
+        throw InputError(table_.path, table_.rows.front().line, "columns",
                          fmt::format("{} names, one for each field", count),
-                         fmt::format("{}", options_.columns.size()));
+                         fmt::format("{}", options_.columns.size()), ErrorCode::argument);
       }
       for (std::size_t k = 0; k < count; ++k) {
         if (options_.columns[k] != "-") take(options_.columns[k], k);
@@ -155,13 +155,15 @@ class PointReader {
     // The same twice, as parts and as their sum: the parts are what an instrument knows.
     if (has("sigma") && has("sx")) {
       if (!options_.columns.empty()) {
-        throw InputError(table_.path, header_line(), "--columns", "sigma or sx, sy, sz", "both");
+        throw InputError(table_.path, header_line(), "columns", "sigma or sx, sy, sz", "both",
+                         ErrorCode::argument);
       }
       unused_.push_back(table_.column_label(columns_.at("sigma")));
       columns_.erase("sigma");
     }
     if (int(has("rx")) + int(has("a")) + int(has("qw")) > 1) {
-      throw InputError(table_.path, header_line(), "", "one orientation", "several (--columns chooses)");
+      throw InputError(table_.path, header_line(), "", "one orientation", "several",
+                       ErrorCode::several_orientations);
     }
     if (has("date") && !has("time"))
       throw InputError(table_.path, header_line(), "date", "a time beside the date", "none");
@@ -171,8 +173,8 @@ class PointReader {
     const auto [at, is_new] = columns_.emplace(role, column);
     if (!is_new) {
       throw InputError(table_.path, header_line(), table_.column_label(column),
-                       fmt::format("one column of {} (--columns says which)", role),
-                       "another one: " + table_.column_label(at->second));
+                       fmt::format("one column of {}", role),
+                       "another one: " + table_.column_label(at->second), ErrorCode::ambiguous_column);
     }
   }
 
@@ -196,10 +198,9 @@ class PointReader {
       plain = false;
     }
     if (!plain) {
-      throw InputError(
-          table_.path, shown->line, "",
-          "name X Y Z, or what the fields mean by a header or --columns (such as name,x,y,z,sigma,-)",
-          fmt::format("{} fields: {}", count, fmt::join(shown->cells, " | ")));
+      throw InputError(table_.path, shown->line, "", "name X Y Z, or what the fields mean by a header",
+                       fmt::format("{} fields: {}", count, fmt::join(shown->cells, " | ")),
+                       ErrorCode::unknown_layout);
     }
     take("x", count - 3);
     take("y", count - 2);
@@ -220,15 +221,13 @@ class PointReader {
   }
 
   /// The unit of a kind of columns, on which the header, the lines before it and the option must agree.
-  Unit settle(const std::vector<std::string>& roles, const UnitSource& remark,
-              const std::optional<Unit>& option, UnitOf unit_of, const char* option_name, const char* kind,
-              const std::vector<std::string>& known) const {
-    if (const auto unit = agreed(roles, {remark}, {option, option_name}, unit_of, kind, known)) return *unit;
+  Unit settle(const std::vector<std::string>& roles, const UnitSource& remark, const UnitSource& option,
+              UnitOf unit_of, ErrorCode none, const char* kind, const std::vector<std::string>& known) const {
+    if (const auto unit = agreed(roles, {remark}, option, unit_of, kind, known)) return *unit;
     throw InputError(
         table_.path, header_line(), fmt::format("{}", fmt::join(roles, ", ")),
-        fmt::format("a unit of {}: in the header (X [mm]), in a line above it (Units: mm) or by {}", kind,
-                    option_name),
-        fmt::format("none; the first row has {}", first_values(roles)));
+        fmt::format("a unit of {}: in the header (X [mm]), in a line above it (Units: mm)", kind),
+        fmt::format("none; the first row has {}", first_values(roles)), none);
   }
 
   /// The same, but nothing where nobody says one.
@@ -257,20 +256,17 @@ class PointReader {
 
   void find_units() {
     const DeclaredUnits declared = declared_units(table_);
-    length_ = settle({"x", "y", "z"}, declared.length, options_.length, length_unit_of, "--unit", "length",
-                     length_unit_names());
+    length_ = settle({"x", "y", "z"}, declared.length, options_.length, length_unit_of,
+                     ErrorCode::no_length_unit, "length", length_unit_names());
     const auto angle_of = [&](const std::vector<std::string>& roles) {
-      return settle(roles, declared.angle, options_.angle, angle_unit_of, "--angle-unit", "angle",
+      return settle(roles, declared.angle, options_.angle, angle_unit_of, ErrorCode::no_angle_unit, "angle",
                     angle_unit_names());
     };
     if (has("rx")) {
       angle_ = angle_of({"rx", "ry", "rz"});
       if (!options_.angles) {
-        throw InputError(
-            table_.path, header_line(), "rx, ry, rz",
-            "to be told what the angles mean: --angles fixed-xyz (SpatialAnalyzer), moving-xyz (Stäubli) "
-            "or rotation-vector",
-            "nothing");
+        throw InputError(table_.path, header_line(), "rx, ry, rz", "to be told what the angles mean",
+                         "nothing", ErrorCode::no_angle_convention);
       }
     }
     if (has("a")) angle_ = angle_of({"a", "b", "c"});
@@ -293,12 +289,14 @@ class PointReader {
 
   /// An option for columns that are not there was meant for another file.
   void refuse_idle_options() const {
-    const auto idle = [this](bool given, bool used, const char* option, const char* columns) {
-      if (given && !used) throw InputError(table_.path, header_line(), option, columns, "none");
+    const auto idle = [this](bool given, bool used, const char* argument, const char* columns) {
+      if (given && !used)
+        throw InputError(table_.path, header_line(), argument, columns, "none", ErrorCode::argument);
     };
-    idle(options_.angles.has_value(), has("rx"), "--angles", "columns rx, ry, rz");
-    idle(options_.angle.has_value(), has("rx") || has("a"), "--angle-unit", "columns rx, ry, rz or a, b, c");
-    idle(options_.coverage != 1, has("sigma") || has("sx"), "--coverage",
+    idle(options_.angles.has_value(), has("rx"), "angles", "columns rx, ry, rz");
+    idle(options_.angle.unit.has_value(), has("rx") || has("a"), "angle_unit",
+         "columns rx, ry, rz or a, b, c");
+    idle(options_.coverage != 1, has("sigma") || has("sx"), "coverage",
          "a column sigma or columns ux, uy, uz");
   }
 
@@ -377,10 +375,10 @@ PointList read_point_list(const std::string& path, const PointListOptions& optio
     const auto& known = point_column_names();
     if (std::find(known.begin(), known.end(), column) != known.end()) continue;
     const std::string near = nearest(column, known);
-    throw InputError("", 0, "--columns",
+    throw InputError("", 0, "columns",
                      near.empty() ? fmt::format("names out of {}", fmt::join(known, ", "))
                                   : fmt::format("a known name (did you mean '{}'?)", near),
-                     "'" + column + "'");
+                     "'" + column + "'", ErrorCode::argument);
   }
   return PointReader(path, options).read();
 }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "exchange/declared_unit.hpp"
 #include "exchange/delimited_text.hpp"
 #include "exchange/rotation_angles.hpp"
 #include "exchange/time_stamp.hpp"
@@ -23,8 +24,8 @@ struct PointListOptions {
   DialectChoice dialect;
   /// Meaning of the columns in order, as name,group,x,y,z,-,sigma; empty: by the header.
   std::vector<std::string> columns;
-  std::optional<Unit> length;  ///< where the file declares none; never against what it declares
-  std::optional<Unit> angle;
+  UnitSource length;  ///< where the file declares none; never against what it declares
+  UnitSource angle;
   std::optional<AngleConvention> angles;
   double coverage = 1;  ///< the file's uncertainties are so many standard deviations
 };

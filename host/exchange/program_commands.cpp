@@ -31,9 +31,10 @@ std::vector<Joints> solutions(const TargetProgram& program, const ProgramTarget&
   if (all.empty()) {
     throw InputError(
         program.path, t.line, t.name,
-        "a pose that the nominal arm reaches with its tool, in F0 (--frame says where F0 is)",
+        "a pose that the nominal arm reaches with its tool, in F0",
         reaching == 0 ? std::string("one that it does not reach")
-                      : fmt::format("{} ways to reach it, none with the turns that it asks for", reaching));
+                      : fmt::format("{} ways to reach it, none with the turns that it asks for", reaching),
+        ErrorCode::unreachable_pose);
   }
   // Only where several remain: there are programs whose cfx was never looked at.
   if (all.size() == 1 || !t.cfx) return all;
@@ -76,8 +77,8 @@ TargetsFile program_commands(const TargetProgram& program, const Robot& robot, c
       const std::vector<Joints> all = solutions(program, t, robot, pose, list.warnings);
       if (all.size() > 1 && !before) {
         throw InputError(program.path, t.line, t.name,
-                         "--start q1,…,q6, the joints at the beginning, of which the nearest way is taken",
-                         fmt::format("{} ways to reach the pose", all.size()));
+                         "the joints at the beginning, of which the nearest way is taken",
+                         fmt::format("{} ways to reach the pose", all.size()), ErrorCode::several_branches);
       }
       const Joints from = before.value_or(all.front());
       target.q_rad = *std::min_element(all.begin(), all.end(), [&from](const Joints& a, const Joints& b) {

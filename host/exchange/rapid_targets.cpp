@@ -48,7 +48,7 @@ class Rapid : public ProgramText {
       }
     }
     warn_of_several_tools(tools_);
-    warn_of_several("work objects", work_objects_, "All poses are taken in the one frame of --frame.");
+    warn_of_several("work objects", work_objects_, "All poses are taken in one frame.");
   }
 
  private:

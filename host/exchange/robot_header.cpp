@@ -73,7 +73,7 @@ std::string c_identifier(std::string_view name) {
   return free ? out : "robot_" + out;
 }
 
-std::string robot_header(const Robot& robot) {
+std::string robot_header(const Robot& robot, const std::string& made_by) {
   const NominalRobot<joint_count>& r = robot.nominal;
   const std::string name = c_identifier(robot.name);
   std::string guard = "FLEXCOMP_ROBOT_";
@@ -92,9 +92,8 @@ std::string robot_header(const Robot& robot) {
     high[j] = r.limits[j].max_rad;
   }
   std::string text;
-  text +=
-      fmt::format("/* The nominal robot of {} for a C or C++ controller, written by \"flexcomp export\".\n",
-                  std::filesystem::path(robot.path).filename().string());
+  text += fmt::format("/* The nominal robot of {} for a C or C++ controller, written by {}.\n",
+                      std::filesystem::path(robot.path).filename().string(), made_by);
   text += fmt::format(" * nominal hash {} */\n", hex(nominal_hash(r)));
   text += fmt::format("/* clang-format off */\n#ifndef {0}\n#define {0}\n\n#include <flexcomp.h>\n\n", guard);
   text += fmt::format("static const flexcomp_robot {} = {{\n    {},\n", name, c_string(robot.name));

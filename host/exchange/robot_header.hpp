@@ -17,7 +17,7 @@ std::string c_identifier(std::string_view name);
 /// A header with one constant of type flexcomp_robot (flexcomp.h), for C and for C++. Its numbers are the shortest
 /// decimals that read back to the very doubles of `robot`, so a controller that is built with it has the same nominal
 /// hash. What a controller does not use (reflectors, bodies, speeds) is left out.
-std::string robot_header(const Robot& robot);
+std::string robot_header(const Robot& robot, const std::string& made_by = "flexcomp");
 
 }  // namespace flexcomp::host
 

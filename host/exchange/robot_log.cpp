@@ -57,14 +57,13 @@ void require_once(const DelimitedText& table, const std::string& column) {
 /// The column that is `what`; nothing where there is none.
 /// \throws InputError  several could be it: `choose` says how to tell
 std::optional<std::size_t> only_one(const DelimitedText& table, const std::vector<std::size_t>& columns,
-                                    const std::string& what, const char* choose) {
+                                    const std::string& what, ErrorCode several) {
   if (columns.empty()) return {};
   const std::string& label = table.header->cells[columns.front()];
   require_once(table, label);
   if (columns.size() > 1) {
-    throw InputError(table.path, table.header->line, label,
-                     fmt::format("one column that can be {} ({} says which)", what, choose),
-                     fmt::format("'{}' as well", table.header->cells[columns[1]]));
+    throw InputError(table.path, table.header->line, label, fmt::format("one column that can be {}", what),
+                     fmt::format("'{}' as well", table.header->cells[columns[1]]), several);
   }
   return columns.front();
 }
@@ -189,10 +188,10 @@ LogMap load_log_map(const std::string& path) {
 }
 
 RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot& robot) {
-  const std::string header = map.joints ? fmt::format("a header with the columns of {}",
-                                                      map.path.empty() ? "--joint-columns" : map.path)
-                                        : "a header with the columns q1 … q6 (or j1 …, a1 …, joint1 …, axis1 "
-                                          "…), or --joint-columns or --map";
+  const std::string header =
+      map.joints
+          ? fmt::format("a header with the columns of {}", map.path.empty() ? map.columns_by : map.path)
+          : "a header with the columns q1 … q6 (or j1 …, a1 …, joint1 …, axis1 …)";
   const auto is_header = [&map](const std::vector<std::string>& cells) {
     for (std::size_t j = 0; j < joint_count; ++j) {
       // Of the columns that a map names one is enough: the header is found, and what is missing is said by name.
@@ -201,7 +200,8 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
     }
     return !map.joints;
   };
-  DelimitedText table = read_delimited(path, map.dialect, is_header, header);
+  DelimitedText table = read_delimited(path, map.dialect, is_header, header,
+                                       map.joints ? ErrorCode::none : ErrorCode::log_without_joints);
   RobotLog log;
   log.path = path;
   std::vector<bool> used(table.header->cells.size());
@@ -212,7 +212,7 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
     if (map.joints) how[j] = (*map.joints)[j];
     joints[j] = map.joints ? require(table, map, how[j].column, fmt::format("joint {}", j + 1))
                            : *only_one(table, find_joint(table.header->cells, j),
-                                       fmt::format("joint {}", j + 1), "--map or --joint-columns");
+                                       fmt::format("joint {}", j + 1), ErrorCode::ambiguous_joint_column);
     if (used[joints[j]]) {
       throw InputError(path, table.header->line, table.column_label(joints[j]), "a column for each joint",
                        fmt::format("it again for joint {}", j + 1));
@@ -221,16 +221,13 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
     const std::string& label = table.header->cells[joints[j]];
     const auto in_name =
         unit_in_name(path, table.header->line, label, angle_unit_of, "a joint's unit, deg or rad");
-    how[j].unit = agreed_unit(path, table.header->line, label,
-                              {{how[j].unit, map.path},
-                               declared.angle,
-                               {in_name, "the column's name"},
-                               {map.joint_unit, "--joint-unit"}});
+    how[j].unit = agreed_unit(
+        path, table.header->line, label,
+        {{how[j].unit, map.path}, declared.angle, {in_name, "the column's name"}, map.joint_unit});
     if (!how[j].unit) {
-      throw InputError(
-          path, table.header->line, label,
-          "deg or rad: in the name (q1_deg, J1 [rad]), in a line above (Units: deg) or by --joint-unit",
-          "no unit");
+      throw InputError(path, table.header->line, label,
+                       "deg or rad: in the name (q1_deg, J1 [rad]), in a line above (Units: deg)", "no unit",
+                       ErrorCode::no_joint_unit);
     }
     log.joint_columns[j] = label;
   }
@@ -264,7 +261,7 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
       log.unused.push_back(label);
     }
   }
-  const auto time = only_one(table, times, "the time", "--map");
+  const auto time = only_one(table, times, "the time", ErrorCode::ambiguous_time_column);
   const Unit time_unit = time ? unit_of_times(table, map, *time, declared.time) : unit::si;
   // Two columns with names do no harm to who joins by order or time.
   std::optional<std::size_t> name;
@@ -280,7 +277,8 @@ RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot&
   std::vector<std::size_t> numbers(joints.begin(), joints.end());
   numbers.insert(numbers.end(), context.begin(), context.end());
   // No joint turns a thousand degrees or radians: a comma there is a decimal comma.
-  table.settle_decimal(numbers, map.dialect.decimal, {joints.begin(), joints.end()}, "decimal in --map");
+  table.settle_decimal(numbers, map.dialect.decimal, {joints.begin(), joints.end()},
+                       ErrorCode::ambiguous_log_decimal_mark);
   log.dialect = table.dialect;
   log.names = name.has_value();
   log.times = time.has_value();

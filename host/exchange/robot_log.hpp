@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "exchange/delimited_text.hpp"
+#include "exchange/declared_unit.hpp"
 #include "exchange/time_stamp.hpp"
 #include "model/robot.hpp"
 #include "units.hpp"
@@ -28,11 +28,12 @@ struct JointColumn {
 
 /// Which column is what (docs/formats.md). Empty names are worked out from the header.
 struct LogMap {
-  std::string path;  ///< of the map, for messages
+  std::string path;        ///< of the map, for messages
+  std::string columns_by;  ///< what names the joints' columns where it is no map, for messages
   DialectChoice dialect;
   std::optional<std::array<JointColumn, joint_count>> joints;
-  std::optional<Unit> joint_unit;  ///< where neither the map nor the header has one
-  std::string name;                ///< column with the names of the poses
+  UnitSource joint_unit;  ///< where neither the map nor the header has one
+  std::string name;       ///< column with the names of the poses
   std::string time;
   std::optional<Unit> time_unit;
   std::vector<std::pair<std::string, std::string>> context;  ///< column of a data file, column of the log

@@ -56,13 +56,13 @@ const UrdfLinkNode* find_tip(const UrdfTree& tree, const std::vector<const UrdfL
   }
   if (tips.size() == 1) return tips.front();
   if (tips.empty()) {
-    throw tree.option_error(
-        "--tip", "a link that is six revolute or continuous joints away from " + to_base.back()->name,
+    throw tree.argument_error(
+        "tip", "a link that is six revolute or continuous joints away from " + to_base.back()->name,
         fmt::format("ends {}", fmt::join(ends, ", ")));
   }
   std::vector<std::string> names;
   for (const UrdfLinkNode* tip : tips) names.push_back(tip->name);
-  throw tree.option_error("--tip", "to be told which of several links to take",
+  throw tree.argument_error("tip", "to be told which of several links to take",
                           fmt::format("{}", fmt::join(names, ", ")));
 }
 
@@ -93,10 +93,10 @@ void read_motion(const UrdfTree& tree, const UrdfJointNode& from, UrdfJoint& joi
 std::size_t find_flange(const UrdfTree& tree, const std::vector<const UrdfLinkNode*>& way,
                         std::size_t last_joint, const std::string& name) {
   if (!name.empty()) {
-    const UrdfLinkNode* const wanted = tree.link("--flange", name);
+    const UrdfLinkNode* const wanted = tree.link("flange", name);
     const auto at = std::find(way.begin() + static_cast<std::ptrdiff_t>(last_joint), way.end(), wanted);
     if (at == way.end()) {
-      throw tree.option_error("--flange",
+      throw tree.argument_error("flange",
                               fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
                               "'" + name + "'");
     }
@@ -115,8 +115,8 @@ UrdfArm load_urdf(const std::string& path, const UrdfLinks& links) {
   UrdfArm arm;
   arm.name = tree.name();
   const std::vector<const UrdfLinkNode*> to_base =
-      ancestry(links.base.empty() ? tree.root() : tree.link("--base", links.base));
-  const UrdfLinkNode* const tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("--tip", links.tip);
+      ancestry(links.base.empty() ? tree.root() : tree.link("base", links.base));
+  const UrdfLinkNode* const tip = links.tip.empty() ? find_tip(tree, to_base) : tree.link("tip", links.tip);
   const std::vector<const UrdfLinkNode*> way = ancestry(tip);
   const std::size_t fork = shared(way, to_base);
   arm.base = to_base.back()->name;

@@ -104,12 +104,12 @@ void UrdfTree::find_root() {
   }
 }
 
-const UrdfLinkNode* UrdfTree::link(const std::string& option, const std::string& name) const {
+const UrdfLinkNode* UrdfTree::link(const std::string& argument, const std::string& name) const {
   if (const auto found = links_.find(name); found != links_.end()) return &found->second;
   std::vector<std::string> known;
   for (const auto& entry : links_) known.push_back(entry.first);
   const std::string near = nearest(name, known);
-  throw option_error(option,
+  throw argument_error(argument,
                      near.empty() ? fmt::format("one of the links {}", fmt::join(known, ", "))
                                   : fmt::format("a link of the file (did you mean '{}'?)", near),
                      "'" + name + "'");

@@ -47,8 +47,8 @@ class UrdfTree {
   std::string name() const { return robot_.attribute("name")->value; }
   const UrdfLinkNode* root() const { return root_; }
   const std::map<std::string, UrdfLinkNode>& links() const { return links_; }
-  /// The link that an option names. \throws InputError  none, with the nearest name
-  const UrdfLinkNode* link(const std::string& option, const std::string& name) const;
+  /// The link that an argument names. \throws InputError  none, with the nearest name
+  const UrdfLinkNode* link(const std::string& argument, const std::string& name) const;
 
   /// From the parent's frame to the joint's; 1 where the file has none. \throws InputError  other than three numbers
   Pose<double> origin(const UrdfJointNode& joint) const;
@@ -62,9 +62,9 @@ class UrdfTree {
   InputError error(const Node& node, const std::string& expected, const std::string& found) const {
     return at(*node.element, fmt::format("{} '{}'", node.element->name, node.name), expected, found);
   }
-  InputError option_error(const std::string& option, const std::string& expected,
-                          const std::string& found) const {
-    return {path_, 0, option, expected, found};
+  InputError argument_error(const std::string& argument, const std::string& expected,
+                            const std::string& found) const {
+    return {path_, 0, argument, expected, found, ErrorCode::argument};
   }
 
  private:

@@ -45,7 +45,8 @@ class TreeBuilder {
     if (XML_Parse(parser_.get(), text_.data(), length, XML_TRUE) == XML_STATUS_OK)
       return std::move(open_.front().children.front());
     throw InputError(path, line(), "", refused_.empty() ? "XML" : "XML without such",
-                     refused_.empty() ? XML_ErrorString(XML_GetErrorCode(parser_.get())) : refused_);
+                     refused_.empty() ? XML_ErrorString(XML_GetErrorCode(parser_.get())) : refused_,
+                     ErrorCode::not_xml);
   }
 
  private:
@@ -97,12 +98,13 @@ const XmlElement* XmlElement::child(std::string_view wanted) const { return name
 
 XmlElement parse_xml(const std::string& path, const std::string& text) {
   if (text.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-    throw InputError(path, 0, "", "XML of less than 2 GiB", fmt::format("{} bytes", text.size()));
+    throw InputError(path, 0, "", "XML of less than 2 GiB", fmt::format("{} bytes", text.size()),
+                     ErrorCode::not_xml);
   // UTF-16 has them too; the places of attributes are looked for byte by byte.
   if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
     throw InputError(path, static_cast<std::size_t>(line), "", "XML in UTF-8 or ISO 8859-1",
-                     "a NUL byte (UTF-16 or no text)");
+                     "a NUL byte (UTF-16 or no text)", ErrorCode::not_xml);
   }
   return TreeBuilder(text).root(path);
 }

@@ -67,7 +67,8 @@ std::size_t CsvTable::require(std::string_view name, std::string_view purpose,
   const std::string near = nearest(name, candidates);
   throw InputError(path, 1, std::string(name), fmt::format("this column ({})", purpose),
                    near.empty() ? fmt::format("none; the columns are {}", fmt::join(header, ", "))
-                                : fmt::format("none, but '{}'", near));
+                                : fmt::format("none, but '{}'", near),
+                   ErrorCode::missing_column);
 }
 
 double CsvTable::number(const CsvRow& row, std::size_t column, const Unit& unit) const {

@@ -186,11 +186,10 @@ class ColumnReader {
       for (const std::size_t c : columns) largest = std::max(largest, std::abs(number(row, c, unit::si)));
     }
     if (largest > suspicious_below) return;
-    throw InputError(
-        table_.path, 0, "q1_deg … q6_deg", "degrees",
-        fmt::format(
-            "no reading above {:.3g} in {} rows: these look like radians (--force takes them as degrees)",
-            largest, table_.rows.size()));
+    throw InputError(table_.path, 0, "q1_deg … q6_deg", "degrees",
+                     fmt::format("no reading above {:.3g} in {} rows: these look like radians", largest,
+                                 table_.rows.size()),
+                     ErrorCode::looks_like_radians);
   }
 
   /// Lists unknown columns, with a warning each. Known columns that are not used (a measured position where

@@ -16,8 +16,8 @@ std::string read_file(const std::string& path) {
     void operator()(std::FILE* f) const { std::fclose(f); }
   };
   const auto unreadable = [&] {
-    return InputError(path, 0, "", "a file that can be read",
-                      errno == ENOENT ? "none" : std::strerror(errno));
+    return InputError(path, 0, "", "a file that can be read", errno == ENOENT ? "none" : std::strerror(errno),
+                      errno == ENOENT ? ErrorCode::no_such_file : ErrorCode::none);
   };
   const std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "rb"));
   if (!file) throw unreadable();

@@ -21,12 +21,13 @@ double length(const YamlField& joint, const char* key, LongLinks long_links) {
   const YamlField field = joint.at(key);
   const double value = field.number(unit::mm);
   if (long_links == LongLinks::refused && std::abs(value) > longest_link_m) {
-    throw field.error(fmt::format(
-        "at most {:.0f} mm either way. Calibrated tables of arms with nearly parallel axes hold such "
-        "lengths, "
-        "which cancel on the next link; 'flexcomp import' of this file gives the same arm with beta_deg in "
-        "their place",
-        longest_link_m / unit::mm.si_per_file_unit()));
+    throw field
+        .error(fmt::format(
+            "at most {:.0f} mm either way. Calibrated tables of arms with nearly parallel axes hold such "
+            "lengths, "
+            "which cancel on the next link",
+            longest_link_m / unit::mm.si_per_file_unit()))
+        .with(ErrorCode::long_links);
   }
   return value;
 }

@@ -49,8 +49,9 @@ void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& 
       std::vector<std::string> names;
       for (const Parameter& p : parameters) names.push_back(p.name);
       const std::string near = nearest(f.name, names);
-      throw InputError("--fix", 0, f.name, "a parameter of this model of " + robot.name,
-                       near.empty() ? "none" : fmt::format("none (did you mean {}?)", near));
+      throw InputError("", 0, f.name, "a parameter of this model of " + robot.name,
+                       near.empty() ? "none" : fmt::format("none (did you mean {}?)", near),
+                       ErrorCode::fixed_parameter);
     }
     found->set(set, f.value_si);
     parameters.erase(found);
@@ -68,10 +69,9 @@ void require_small_base(const Calibration& calibration, const std::string& sourc
     largest = std::max(largest, std::abs(t.coefficient));
   }
   if (shift > 0.020 || rotation > radians(2)) {
-    throw InputError(
-        source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
-        fmt::format("{:.1f} mm, {:.2f} degrees; --frames fit lets the measurement frame lie anywhere",
-                    shift * 1e3, degrees(rotation)));
+    throw InputError(source, 0, "base", "a base within 20 mm and 2 degrees of the nominal one",
+                     fmt::format("{:.1f} mm, {:.2f} degrees", shift * 1e3, degrees(rotation)),
+                     ErrorCode::distant_base);
   }
 }
 
@@ -131,7 +131,7 @@ void require_plausible_residuals(const Robot& robot, const std::vector<Observati
   if (ratio > 100) suspicion = "positions are in micrometres, not in millimetres";
   throw InputError(source, 0, "x_mm y_mm z_mm",
                    fmt::format("residuals to the nominal {} below {:.0f} mm", robot.name, limit * 1e3),
-                   fmt::format("{:.1f} mm (rms): {}? --force goes on all the same", found * 1e3, suspicion));
+                   fmt::format("{:.1f} mm (rms): {}?", found * 1e3, suspicion), ErrorCode::implausible_data);
 }
 
 Identification identify(const Robot& robot, const std::vector<Observation>& rows, const std::string& source,

@@ -45,9 +45,8 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
     // With fitted frames the base is part of F, and the controller's target is in the robot's own base anyway.
     if (t.place.body == body::base && t.effect == Effect::geometric && calibration.frames) continue;
     if (t.effect == Effect::unnamed && !options.allow_unnamed) {
-      throw InputError(source, 0, "effects",
-                       "effects that are understood (--allow-unnamed pushes the others too)",
-                       fmt::format("an unnamed one at {}", place_name(t.place)));
+      throw InputError(source, 0, "effects", "effects that are understood",
+                       fmt::format("an unnamed one at {}", place_name(t.place)), ErrorCode::unnamed_effect);
     }
     if (t.effect == Effect::geometric && is_beyond_small(t)) {
       throw InputError(source, 0, geometric_name(t.place), small_terms_rule,

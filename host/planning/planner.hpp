@@ -6,8 +6,10 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "planning/search.hpp"
@@ -15,6 +17,10 @@
 namespace flexcomp::host {
 
 enum class Method { refine, exchange, detmax, sapso };
+inline const std::map<std::string, Method> planning_methods{{"refine", Method::refine},
+                                                            {"exchange", Method::exchange},
+                                                            {"detmax", Method::detmax},
+                                                            {"sapso", Method::sapso}};
 
 /// What `effort` 1 means: about a second of work for `refine` whatever the task; 200 restarts of exchange, or as many as
 /// five million evaluations allow; ten of DETMAX; 600 motions of the swarm.

@@ -125,7 +125,7 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
       "The models of the paper, each fitted anew to these rows{}. What a model gains on the rows that it is "
       "fitted to may be noise that it has learnt; what it gains on rows left out is the arm. Left out: each "
       "row in turn, predicted by a fit to all the others.",
-      without_priors ? ", without the --fix and --tolerances of this run" : "")};
+      without_priors ? ", without the fixed parameters and tolerances of this run" : "")};
   section.columns = {
       "model",        "parameters",        "fitted: mean [mm]", "largest [mm]", "left out: mean [mm]",
       "largest [mm]", "chi-square per dof"};

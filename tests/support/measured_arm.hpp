@@ -30,7 +30,7 @@ struct MeasuredArm {
 /// Nothing where the data are absent.
 inline std::optional<MeasuredArm> measured_arm(const std::string& name) {
   const char* set = std::getenv("FLEXCOMP_DATA");
-  const std::string data = set != nullptr ? set : std::string(FLEXCOMP_SOURCE_DIR) + "/../shared/data";
+  const std::string data = set != nullptr ? set : FLEXCOMP_SOURCE_DIR "/../shared/data";
   const std::string folder = data + "/" + name + "/";
   if (!std::filesystem::exists(folder)) return {};
   return MeasuredArm{load_robot(folder + "robot.yaml"), folder};

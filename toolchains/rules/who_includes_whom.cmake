@@ -22,20 +22,22 @@ set(tests_may ${parts})
 set(modules model linalg measurement kinematics files identification planning diagnosis bus exchange report studies commands)
 set(model_may)
 set(linalg_may)
-set(measurement_may model linalg)
+set(measurement_may model linalg kinematics)
 set(kinematics_may model)
 set(files_may model measurement)
 set(identification_may model measurement linalg)
-set(planning_may model measurement linalg identification)
+set(planning_may model measurement linalg identification files)
 # data_file.hpp for the names of columns in a message.
 set(diagnosis_may model measurement linalg identification host/files/data_file.hpp)
 set(bus_may model files)
-set(exchange_may model linalg measurement kinematics files)
-set(report_may model linalg measurement identification diagnosis)
-set(studies_may model linalg measurement kinematics files identification planning report)
+set(exchange_may model measurement linalg kinematics files)
+set(report_may model measurement linalg files identification planning diagnosis)
+set(studies_may model measurement linalg kinematics files identification planning report)
 set(commands_may ${modules})
 # The program is one of the commands' files.
 set(module_of_host/main.cpp commands)
+# Names of values of the model and of measured data.
+set(module_of_host/named_values.hpp measurement)
 set(include_roots include firmware/include firmware/src firmware/boards/common host hil/controller hil tests .)
 
 # The module of a file of host, empty for one without.

@@ -499,7 +499,7 @@ TEST(CanopenClient, TellsTheRobotOrAsksForIt) {
     robot_of(*client, "");
     FAIL();
   } catch (const BusError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("give its file with --robot"));
+    EXPECT_EQ(e.code(), ErrorCode::unknown_robot);
   }
 }
 

@@ -13,7 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "commands/diagnosis_json.hpp"
+#include "commands/diagnosis_text.hpp"
+#include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/effect_profile.hpp"
 #include "diagnosis/held_out.hpp"
 #include "diagnosis/messages.hpp"
@@ -373,7 +374,7 @@ TEST(HeldOut, FittedRowsAreRefused) {
     refuse_the_fitted(fitted, other);
     FAIL();
   } catch (const InputError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("h.csv:5: --holdout"));
+    EXPECT_THAT(e.what(), HasSubstr("h.csv:5: expected poses that were not fitted"));
     EXPECT_THAT(e.what(), HasSubstr("the measurement of d.csv:5"));
   }
   EXPECT_THROW(refuse_the_fitted(fitted, fitted), InputError);

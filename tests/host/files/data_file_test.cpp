@@ -147,7 +147,7 @@ TEST(MeasuredData, SuspectsRadians) {
   const std::string text = joints + ",x_mm,y_mm,z_mm\n" +
                            "0.1,0.2,0.3,3.1,0.5,0.6,1,2,3\n-1,0.2,0.3,0.4,0.5,6.2,4,5,6\n" +
                            "1,0.2,0.3,0.4,0.5,-0.6,7,8,9\n";
-  refused(text, 0, "q1_deg … q6_deg", {"no reading above 6.2 in 3 rows", "radians", "--force"});
+  refused(text, 0, "q1_deg … q6_deg", {"no reading above 6.2 in 3 rows", "radians"});
   EXPECT_EQ(load(text, {.force = true}).rows.size(), 3U);
   EXPECT_NO_THROW(load(replaced(text, "6.2", "7.1")));
 }

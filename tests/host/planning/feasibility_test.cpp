@@ -555,7 +555,7 @@ TEST(Feasibility, WhatIsNotTestedIsSaid) {
   for (int k = 0; k < 1000; ++k) EXPECT_TRUE(bare.allows(random.pose(robot)));
   robot.reflectors_m.clear();
   const Feasibility point(robot, in_front());
-  EXPECT_THAT(point.warnings(), Contains(HasSubstr("the tool point stands for the reflector")));
+  EXPECT_THAT(point.warnings(), Contains(HasSubstr("the tool point is tested as the reflector")));
   EXPECT_EQ(point.source(), "cell.yaml");
   EXPECT_THAT(point.why({0, 0, 0, 0, radians(-120), 0}), HasSubstr("the tool point"));
 }
@@ -585,7 +585,7 @@ TEST(Feasibility, NoRoomIsAnErrorThatSaysWhatWasInTheWay) {
   Cell cell = in_front();
   cell.acceptance_rad = radians(0.5);
   support::expect_refused([&] { feasible_poses(Feasibility(robot, cell), robot, 14, 1); }, 0, "",
-                          {"cell.yaml", "room for 14 poses", "% reflectors face away", "random poses"});
+                          {"cell.yaml", "a cell with 14 feasible poses", "% reflectors face away", "random poses"});
   cell = in_front();
   cell.obstacles = {capsule(0, *cell.tracker_m, *cell.tracker_m, 0.1)};
   support::expect_refused([&] { feasible_poses(Feasibility(robot, cell), robot, 1, 1); }, 0, "",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The criterion against independent computations, the methods against brute force and against each other, and what a
 // plan promises: allowed poses, the same plan from the same seed, the same result after a stop.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -28,7 +29,7 @@ namespace {
 using namespace flexcomp;
 using namespace flexcomp::host;
 
-Robot tx60l() { return load_robot(std::string(FLEXCOMP_SOURCE_DIR) + "/host/robots/tx60l.yaml"); }
+Robot tx60l() { return load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml"); }
 
 struct Task {
   Robot robot;
@@ -502,7 +503,7 @@ TEST(Refine, BeatsManyRestartsOfExchange) {
   const bool full = std::getenv("FLEXCOMP_FULL_SIZE") != nullptr;
   for (const char* name : {"tx60l", "rx160l", "ur10"}) {
     for (const std::size_t n : full ? std::vector<std::size_t>{14, 20, 40} : std::vector<std::size_t>{14}) {
-      Robot robot = load_robot(std::string(FLEXCOMP_SOURCE_DIR) + "/host/robots/" + name + ".yaml");
+      Robot robot = load_robot(fmt::format("{}/host/robots/{}.yaml", FLEXCOMP_SOURCE_DIR, name));
       if (robot.nominal.payload_kg == 0) robot.nominal.payload_kg = 5;
       const Task t = task_of(robot, n);
       ExchangeOptions options;

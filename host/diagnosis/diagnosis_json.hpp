@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A diagnosis for machines: keys in docs/diagnosis.md.
-#ifndef FLEXCOMP_HOST_COMMANDS_DIAGNOSIS_JSON_HPP
-#define FLEXCOMP_HOST_COMMANDS_DIAGNOSIS_JSON_HPP
+#ifndef FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
+#define FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "commands/diagnosis_json.hpp"
+#include "diagnosis/diagnosis_json.hpp"
 
 #include <cmath>
 #include <nlohmann/json.hpp>

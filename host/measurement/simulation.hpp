@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Measured data from an assumed true robot: random poses and contexts, and an instrument with normal noise.
+#ifndef FLEXCOMP_HOST_MEASUREMENT_SIMULATION_HPP
+#define FLEXCOMP_HOST_MEASUREMENT_SIMULATION_HPP
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "measurement/measured_data.hpp"
+#include "measurement/noise_level.hpp"
+#include "model/calibration.hpp"
+
+namespace flexcomp::host {
+
+struct Simulation {
+  MeasurementKind kind = MeasurementKind::pose;
+  NoiseLevel noise = no_noise;
+  std::size_t poses = 0;            ///< random ones, uniform within the joint limits
+  std::vector<double> payloads_kg;  ///< in turn; default: the robot file's
+  bool context = false;             ///< also random motion before each pose, temperature and time
+  std::uint64_t seed = 1;
+};
+
+/// \param truth   the robot's errors, and the frames of the measurement
+/// \param joints  poses with their contexts instead of random ones
+/// \throws InputError  no_reflectors
+MeasuredData simulate(const Robot& robot, const Calibration& truth, const Simulation& simulation,
+                      const std::optional<MeasuredData>& joints = {});
+
+}  // namespace flexcomp::host
+
+#endif

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "model/set_difference_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "units.hpp"
+
+namespace flexcomp::host {
+
+nlohmann::ordered_json to_json(const SetDifference& d) {
+  nlohmann::ordered_json result;
+  result["unchanged"] = d.unchanged;
+  result["tool"] = {{"mean_mm", d.at_tool.mean_m * 1e3},
+                    {"largest_mm", d.at_tool.largest_m * 1e3},
+                    {"largest_deg", degrees(d.at_tool.largest_rad)},
+                    {"poses", d.poses}};
+  result["parameters"] = nlohmann::ordered_json::array();
+  for (const ParameterChange& c : d.changes) {
+    result["parameters"].push_back({{"name", c.name},
+                                    {"old", c.before / c.unit.si_per_file_unit()},
+                                    {"new", c.after / c.unit.si_per_file_unit()},
+                                    {"unit", c.unit.name},
+                                    {"tool_mm", c.at_tool.largest_m * 1e3},
+                                    {"tool_deg", degrees(c.at_tool.largest_rad)}});
+  }
+  return result;
+}
+
+}  // namespace flexcomp::host
