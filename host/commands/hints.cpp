@@ -53,7 +53,8 @@ std::string of_input(const InputError& e, const std::string& command) {
     return "\"flexcomp import --joints LOG.csv\" makes a data file of an instrument's export and a robot's "
            "log";
   }
-  if (command == "import" && e.expected().starts_with("XML") && !e.file().ends_with(".urdf") && !e.file().ends_with(".xml"))
+  if (command == "import" && e.expected().starts_with("XML") && !e.file().ends_with(".urdf") &&
+      !e.file().ends_with(".xml"))
     return "an instrument's points become data with --joints LOG.csv --robot ROBOT.yaml";
   if (expects("points that are also in"))
     return "--names takes the points' names apart, as --names '*::{pose}_{reflector}'; --join order asks for "
