@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the commands are in a build without foreign formats (FLEXCOMP_EXCHANGE=OFF): import and export say so, as does
 // compensate of a program.
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <string_view>
