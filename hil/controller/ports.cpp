@@ -282,8 +282,7 @@ host::Descriptor RtuPort::open() const {
 
 RtuPort::RtuPort(firmware::Device& device, firmware::Origin origin, const host::ModbusRtuAddress& address)
     : address_(address), server_(device, origin), line_(server_, address.unit, rtu_gap_us, {this, send}) {
-  if (speed(address.baud) == B0)
-    throw host::BusError(text(), "a baud rate that serial devices do not have");
+  if (speed(address.baud) == B0) throw host::BusError(text(), "a baud rate that serial devices do not have");
   device_ = open();
   if (!device_) throw host::BusError(text(), reason());
 }

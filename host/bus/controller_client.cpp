@@ -243,14 +243,15 @@ void ControllerClient::throw_refusal(const std::string& request, const BusRefusa
   if (from_bus.busy) {
     throw RefusedByController(
         where_,
-        fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work", request,
-                    static_cast<double>(options_.response_timeout.count()) / 1000, from_bus.code),
+        fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
+                    request, static_cast<double>(options_.response_timeout.count()) / 1000, from_bus.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(
       where_,
       fmt::format("asked to {}, the controller refused: {}", request,
-                  has_reason ? fmt::format("{} ({})", describe(answer, refusal, now.detail), from_bus.code) : from_bus.code),
+                  has_reason ? fmt::format("{} ({})", describe(answer, refusal, now.detail), from_bus.code)
+                             : from_bus.code),
       has_reason ? answer : wire::Answer::refused, has_reason ? refusal : Refusal::none);
 }
 

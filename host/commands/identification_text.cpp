@@ -74,10 +74,10 @@ std::vector<std::string> text_lines(const Identification& r, const Robot& robot,
                                     std::size_t rows, const std::string& out) {
   std::vector<std::string> lines;
   const auto say = [&lines](const std::string& line) { lines.push_back(line); };
-  say(fmt::format("{}: {} rows of {}; {} of {} parameters are identifiable{}", data, rows, robot.name,
-                  r.identifiable, r.parameters,
-                  r.frame_parameters > 0 ? fmt::format(", and {} frame parameters", r.frame_parameters)
-                                         : std::string()));
+  say(fmt::format(
+      "{}: {} rows of {}; {} of {} parameters are identifiable{}", data, rows, robot.name, r.identifiable,
+      r.parameters,
+      r.frame_parameters > 0 ? fmt::format(", and {} frame parameters", r.frame_parameters) : std::string()));
   for (const Confounded& c : r.identifiability.confounded) {
     std::string with;
     for (const std::string& w : c.with) with += (with.empty() ? "" : ", ") + w;
@@ -94,7 +94,8 @@ std::vector<std::string> text_lines(const Identification& r, const Robot& robot,
 
   if (r.pure_error) say(repeats_text(*r.pure_error));
   if (!r.identifiability.payload_gains.empty())
-    say(payload_advice(r.identifiability.payload_gains, r.fit.estimate.set, r.identifiability.fitted.parameters));
+    say(payload_advice(r.identifiability.payload_gains, r.fit.estimate.set,
+                       r.identifiability.fitted.parameters));
 
   return lines;
 }

@@ -14,11 +14,10 @@ std::vector<std::string> text_lines(const PlanTask& task, const PlanResult& r, c
   const PoseInformation& information = *problem.information;
   std::vector<std::string> lines;
   lines.push_back(fmt::format(
-      "{}: {} poses of {} by {}{}; {} of {} parameters are identifiable{}", output, r.set.size(), task.robot.name,
-      name_in(planning_methods, task.method), r.stopped ? ", STOPPED before the end" : "",
+      "{}: {} poses of {} by {}{}; {} of {} parameters are identifiable{}", output, r.set.size(),
+      task.robot.name, name_in(planning_methods, task.method), r.stopped ? ", STOPPED before the end" : "",
       information.parameters(), information.parameters_of_model(),
-      information.nuisance() > 0 ? fmt::format(", beside {} frame parameters", information.nuisance())
-                                 : ""));
+      information.nuisance() > 0 ? fmt::format(", beside {} frame parameters", information.nuisance()) : ""));
   const double median = r.random_median();
   lines.push_back(fmt::format(
       "  criterion {:.6g} (expected Omin {:.6g} / O1 {:.6g}); random poses: {:.6g} (median of {} sets), "

@@ -29,12 +29,11 @@ std::vector<Joints> solutions(const TargetProgram& program, const ProgramTarget&
   const std::size_t reaching = all.size();
   std::erase_if(all, [&t](const Joints& q) { return !words_fit(t, q); });
   if (all.empty()) {
-    throw InputError(
-        program.path, t.line, t.name,
-        "a pose that the nominal arm reaches with its tool, in F0",
-        reaching == 0 ? std::string("one that it does not reach")
-                      : fmt::format("{} ways to reach it, none with the turns that it asks for", reaching),
-        ErrorCode::unreachable_pose);
+    throw InputError(program.path, t.line, t.name, "a pose that the nominal arm reaches with its tool, in F0",
+                     reaching == 0
+                         ? std::string("one that it does not reach")
+                         : fmt::format("{} ways to reach it, none with the turns that it asks for", reaching),
+                     ErrorCode::unreachable_pose);
   }
   // Only where several remain: there are programs whose cfx was never looked at.
   if (all.size() == 1 || !t.cfx) return all;

@@ -63,7 +63,7 @@ const UrdfLinkNode* find_tip(const UrdfTree& tree, const std::vector<const UrdfL
   std::vector<std::string> names;
   for (const UrdfLinkNode* tip : tips) names.push_back(tip->name);
   throw tree.argument_error("tip", "to be told which of several links to take",
-                          fmt::format("{}", fmt::join(names, ", ")));
+                            fmt::format("{}", fmt::join(names, ", ")));
 }
 
 void read_motion(const UrdfTree& tree, const UrdfJointNode& from, UrdfJoint& joint,
@@ -97,8 +97,8 @@ std::size_t find_flange(const UrdfTree& tree, const std::vector<const UrdfLinkNo
     const auto at = std::find(way.begin() + static_cast<std::ptrdiff_t>(last_joint), way.end(), wanted);
     if (at == way.end()) {
       throw tree.argument_error("flange",
-                              fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
-                              "'" + name + "'");
+                                fmt::format("a link from {} to {}", way[last_joint]->name, way.back()->name),
+                                "'" + name + "'");
     }
     return static_cast<std::size_t>(at - way.begin());
   }

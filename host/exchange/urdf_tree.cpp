@@ -110,9 +110,9 @@ const UrdfLinkNode* UrdfTree::link(const std::string& argument, const std::strin
   for (const auto& entry : links_) known.push_back(entry.first);
   const std::string near = nearest(name, known);
   throw argument_error(argument,
-                     near.empty() ? fmt::format("one of the links {}", fmt::join(known, ", "))
-                                  : fmt::format("a link of the file (did you mean '{}'?)", near),
-                     "'" + name + "'");
+                       near.empty() ? fmt::format("one of the links {}", fmt::join(known, ", "))
+                                    : fmt::format("a link of the file (did you mean '{}'?)", near),
+                       "'" + name + "'");
 }
 
 InputError UrdfTree::number_error(const UrdfJointNode& joint, const XmlElement& element,

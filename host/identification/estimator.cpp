@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "distributions.hpp"
-#include "linalg/decompositions.hpp"
 #include "identification/statistics.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 

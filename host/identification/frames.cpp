@@ -7,8 +7,8 @@
 
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "identification/statistics.hpp"
+#include "linalg/nearest_rotation.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
 

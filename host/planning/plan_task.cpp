@@ -184,13 +184,12 @@ void PlanTask::check_number() {
   if (settings.poses < *least) {
     throw ArgumentError(
         ErrorCode::too_few_poses,
-        fmt::format("{} {} of kind '{}' cannot know {} parameters{} of {}; the least number is {}",
-                    settings.poses, settings.poses == 1 ? "pose" : "poses",
-                    name_in(measurement_kinds, measure), information.parameters(),
-                    information.nuisance() > 0
-                        ? fmt::format(" and {} frame parameters", information.nuisance())
-                        : "",
-                    robot.name, *least));
+        fmt::format(
+            "{} {} of kind '{}' cannot know {} parameters{} of {}; the least number is {}", settings.poses,
+            settings.poses == 1 ? "pose" : "poses", name_in(measurement_kinds, measure),
+            information.parameters(),
+            information.nuisance() > 0 ? fmt::format(" and {} frame parameters", information.nuisance()) : "",
+            robot.name, *least));
   }
   const std::size_t numbers =
       (settings.poses + known.size()) * static_cast<std::size_t>(problem.instrument.rows());

@@ -20,7 +20,7 @@ Page page_of(const PlanTask& task, const PlanResult& result) {
                 {"criterion", fmt::format("{:.6g}", result.value.criterion)},
                 {"random poses (median)", fmt::format("{:.6g}", result.random_median())},
                 {"identifiable parameters", fmt::format("{} of {}", problem.information->parameters(),
-                                                             problem.information->parameters_of_model())},
+                                                        problem.information->parameters_of_model())},
                 {"measured", name_in(measurement_kinds, task.measure)},
                 {"allowed within the limits", fmt::format("{:.1f} %", 100.0 * task.feasible_share)}};
   if (!task.measured_file.empty())

@@ -247,8 +247,10 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
     EstimatorOptions plain_squares;
     plain_squares.robust = false;
     // The fit of the paper's model alone is one of robust weights; again, without them.
-    const Fit none = fit(base.estimate, oracle.before.identifiability.fitted, c.train, c.robot, plain_squares);
-    const double bic_none = none.chi2 + static_cast<double>(oracle.before.identifiability.fitted.count()) * log_n;
+    const Fit none =
+        fit(base.estimate, oracle.before.identifiability.fitted, c.train, c.robot, plain_squares);
+    const double bic_none =
+        none.chi2 + static_cast<double>(oracle.before.identifiability.fitted.count()) * log_n;
     const double bic_truth = bic_none - oracle.hidden.front().detection;
     std::size_t fits = 0;
     double best = bic_none;
@@ -273,7 +275,8 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
       // At most one of its own columns is the paper's already.
       const double further = static_cast<double>(model.parameters.size() - first);
       best = std::min(
-          best, fitted.chi2 + (static_cast<double>(oracle.before.identifiability.fitted.count()) + further) * log_n);
+          best, fitted.chi2 +
+                    (static_cast<double>(oracle.before.identifiability.fitted.count()) + further) * log_n);
       ++fits;
     }
     EXPECT_GT(fits, 120U);

@@ -183,7 +183,8 @@ TEST(Image, IsTheSameWhateverTheOrderOfTheTerms) {
 
 TEST(Image, RefusesWhatIsNotUnderstoodOrTooLarge) {
   const Calibration c = load(full);
-  expect_refused([&] { make_image(c, tx60l(), 1); }, 0, "effects", {"effects that are understood", "link3.theta"});
+  expect_refused([&] { make_image(c, tx60l(), 1); }, 0, "effects",
+                 {"effects that are understood", "link3.theta"});
   Calibration large = c;
   for (Term<double>& t : large.terms.terms) {
     if (t.place == Place{body::tool, slot::rz}) t.coefficient = radians(3);

@@ -310,10 +310,12 @@ TEST(Payloads, NoneAtAllIsAnsweredWithPosesThatHaveOne) {
   auto rows = measure(robot, truth(), 40, 3, how);
   const Identification r = identify(robot, rows, "data", IdentifyOptions());
   EXPECT_EQ(r.identifiability.missing.size(), 5U);
-  for (const std::string& name : r.identifiability.missing) EXPECT_EQ(name.rfind("joint_compliance", 0), 0U) << name;
+  for (const std::string& name : r.identifiability.missing)
+    EXPECT_EQ(name.rfind("joint_compliance", 0), 0U) << name;
   EXPECT_FALSE(r.doubts.empty());
   ASSERT_FALSE(r.identifiability.suggested_poses.empty());
-  for (const SuggestedPose& c : r.identifiability.suggested_poses) EXPECT_EQ(c.payload_kg, robot.nominal.payload_kg);
+  for (const SuggestedPose& c : r.identifiability.suggested_poses)
+    EXPECT_EQ(c.payload_kg, robot.nominal.payload_kg);
   const auto model = prepare(truth(), robot, "truth");
   std::mt19937_64 random(8);
   for (const SuggestedPose& c : r.identifiability.suggested_poses) {

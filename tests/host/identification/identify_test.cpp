@@ -236,7 +236,8 @@ TEST(Identify, OneOrientationIsAnsweredWithWhatIsMissingAndTheCureCures) {
   EXPECT_FALSE(r.identifiability.missing.empty());
   ASSERT_FALSE(r.identifiability.suggested_poses.empty());
   ASSERT_LE(r.identifiability.suggested_poses.size(), 20U);
-  for (const auto& c : r.identifiability.suggested_poses) rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
+  for (const auto& c : r.identifiability.suggested_poses)
+    rows.push_back(measure(*model, c.q_rad, rows.size(), how, random));
   const Identification cured = identify(robot, rows, "data", IdentifyOptions());
   EXPECT_TRUE(cured.identifiability.missing.empty()) << cured.identifiability.missing.front();
   EXPECT_EQ(cured.identifiable, 36U);

@@ -584,8 +584,9 @@ TEST(Feasibility, NoRoomIsAnErrorThatSaysWhatWasInTheWay) {
   const Robot robot = robot_of("tx60l");
   Cell cell = in_front();
   cell.acceptance_rad = radians(0.5);
-  support::expect_refused([&] { feasible_poses(Feasibility(robot, cell), robot, 14, 1); }, 0, "",
-                          {"cell.yaml", "a cell with 14 feasible poses", "% reflectors face away", "random poses"});
+  support::expect_refused(
+      [&] { feasible_poses(Feasibility(robot, cell), robot, 14, 1); }, 0, "",
+      {"cell.yaml", "a cell with 14 feasible poses", "% reflectors face away", "random poses"});
   cell = in_front();
   cell.obstacles = {capsule(0, *cell.tracker_m, *cell.tracker_m, 0.1)};
   support::expect_refused([&] { feasible_poses(Feasibility(robot, cell), robot, 1, 1); }, 0, "",

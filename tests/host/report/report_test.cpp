@@ -746,10 +746,12 @@ TEST(Report, OneStepIsNoCourse) {
 
 TEST(Report, TheModelsSayWhatTheyWereFittedWithout) {
   const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
-  const std::string words = "fitted anew to these rows, without the fixed parameters and tolerances of this run.";
+  const std::string words =
+      "fitted anew to these rows, without the fixed parameters and tolerances of this run.";
   const Identification r;
   EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, true), false), HasSubstr(words));
-  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, false), false), Not(HasSubstr("the fixed parameters")));
+  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, false), false),
+              Not(HasSubstr("the fixed parameters")));
 }
 
 TEST(Report, DotsShrinkWithTheirNumber) {
