@@ -88,7 +88,8 @@ void Identify::run() const {
                    !options.fixed.empty() || !options.tolerances.empty());
   });
   if (r.doubts.empty()) return;
-  throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, doubts_text(r)));
+  throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, doubts_text(r)),
+                       r.fit.converged ? ErrorCode::none : ErrorCode::improbable_chi_square);
 }
 
 }  // namespace

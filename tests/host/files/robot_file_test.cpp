@@ -135,8 +135,7 @@ TEST(Robot, RefusesLengthsOfNoArm) {
     const std::size_t joint = name == "a_mm" ? 2 : 4;
     const std::string field = "joints[" + std::to_string(joint) + "]." + name;
     EXPECT_NO_THROW(load(replaced(good, key, name + ": -20000")));
-    refused(replaced(good, key, name + ": -20001"), joint + 2, field,
-            {"20000 mm", "beta_deg", "flexcomp import"});
+    refused(replaced(good, key, name + ": -20001"), joint + 2, field, {"20000 mm", "nearly parallel"});
   }
 }
 
