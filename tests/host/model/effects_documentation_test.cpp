@@ -37,7 +37,7 @@ std::string basis_text(const Term<double>& t, const EffectId& id) {
     case Basis::load_torque_cubed:
       return fmt::format("τ{}³", j);
     case Basis::link_weight:
-      return fmt::format("s of joint {} to joint {:g}", j, t.argument + 1);
+      return fmt::format("s of joint {} to joint {}", j, t.distal_joint + 1);
     case Basis::joint_position:
       return fmt::format("q{}", j);
     case Basis::sine:
