@@ -2,25 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The command line as a user meets it: exit status, messages, files; simulate, predict, compensate.
 set -u
-flexcomp=$FLEXCOMP_BIN_DIR/flexcomp
-robot=$FLEXCOMP_SOURCE_DIR/host/robots/tx60l.yaml
-truth=$FLEXCOMP_SOURCE_DIR/tests/data/tx60l_table1.yaml
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder" || exit 1
-failures=0
-
-fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
-
-# expect STATUS MESSAGE COMMAND…: exit status, and a text that is in what it says
-expect() {
-  local status=$1 message=$2
-  shift 2
-  "$flexcomp" "$@" >out.txt 2>&1
-  local got=$?
-  [ $got -eq "$status" ] || fail "flexcomp $*: exit status $got, expected $status: $(cat out.txt)"
-  [ -z "$message" ] || grep -qF -- "$message" out.txt || fail "flexcomp $*: does not say '$message': $(cat out.txt)"
-}
+source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
 
 expect 0 "Exit status" --help
 expect 0 "Example" simulate --help

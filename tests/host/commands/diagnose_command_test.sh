@@ -3,34 +3,7 @@
 # `flexcomp diagnose` as a user meets it: simulated arms with one hidden effect, the answer for people and machines, what
 # held-out rows may and may not change, bad input, exit statuses, the files that are left.
 set -uo pipefail
-flexcomp="${FLEXCOMP_BIN_DIR:?}/flexcomp"
-root="${FLEXCOMP_SOURCE_DIR:?}"
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-robot="$root/host/robots/tx60l.yaml"
-failures=0
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-# expect STATUS PATTERN… -- COMMAND…   every pattern must be in what the command says; it is left in said.txt
-expect() {
-  local status=$1 patterns=() pattern got begin=$SECONDS
-  shift
-  while [[ $1 != -- ]]; do
-    patterns+=("$1")
-    shift
-  done
-  shift
-  "$@" >said.txt 2>&1
-  got=$?
-  [[ $got -eq $status ]] || { fail "exit status $got, expected $status: $*"; cat said.txt; }
-  for pattern in "${patterns[@]}"; do
-    grep -qF -- "$pattern" said.txt || { fail "no '$pattern' in what was said by: $*"; cat said.txt; }
-  done
-  echo "ok: $status ${patterns[*]} ($((SECONDS - begin)) s)"
-}
+source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
 absent() {
   local file
   for file in "$@"; do [[ ! -e $file ]] || fail "$file was left behind"; done
@@ -56,7 +29,7 @@ simulate --truth harmonic.yaml --poses 100 --seed 3 --context --payloads 0,1.108
 simulate --truth harmonic.yaml --poses 60 --seed 4 --context --payloads 0,1.108 -o h.csv
 
 # --- the whole answer -------------------------------------------------------------------------------------------------
-expect 0 "joint 3 has an error that comes twice per turn" "gear_harmonic[joint=3,order=2]" "arcsec" "held-out rows" \
+expect_all 0 "joint 3 has an error that comes twice per turn" "gear_harmonic[joint=3,order=2]" "arcsec" "held-out rows" \
   "a.yaml: written" "r.html: written" "flexcomp push --to BUS a.yaml" -- \
   diagnose --data d.csv --holdout h.csv -o a.yaml --json a.json --report r.html --seed 5
 judge named_and_nothing_else a.json
@@ -66,34 +39,34 @@ grep -q '<svg' r.html || fail "no drawing in r.html"
 sed '/<script>/,/<\/script>/d' r.html | grep -Eq '<link|<img|(src|href)=.?(https?:)?//|url\(' && fail "r.html needs something from elsewhere"
 
 # --- held-out rows change the held-out numbers alone; one seed, one result ------------------------------------------------
-expect 0 -- diagnose --data d.csv -o b.yaml --json b.json --seed 5 --quiet
-[[ ! -s said.txt ]] || fail "--quiet: $(cat said.txt)"
+expect_all 0 -- diagnose --data d.csv -o b.yaml --json b.json --seed 5 --quiet
+[[ ! -s out.txt ]] || fail "--quiet: $(cat out.txt)"
 judge the_same_without_holdout a.json b.json
 diff <(grep -v '^date:' a.yaml) <(grep -v '^date:' b.yaml) || fail "--holdout changes the calibration"
 
 # What was written is a calibration like any other.
-expect 0 "chi-square" -- "$flexcomp" validate --robot "$robot" --calibration a.yaml --data h.csv --json v.json
+expect_all 0 "chi-square" -- "$flexcomp" validate --robot "$robot" --calibration a.yaml --data h.csv --json v.json
 judge and_validates_to_the_numbers_that_were_promised a.json v.json
-expect 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration a.yaml --targets h.csv -o c.csv
+expect_all 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration a.yaml --targets h.csv -o c.csv
 
 # --- nothing hidden; from a calibration; nothing to tell apart ------------------------------------------------------------
 simulate --truth "$root"/tests/data/tx60l_table1.yaml --poses 100 --seed 3 --context --payloads 0,1.108 -o plain.csv
 "$flexcomp" identify --robot "$robot" --data plain.csv -o start.yaml --quiet
-expect 0 "Nothing is missing" "poses.csv: not written" -- \
+expect_all 0 "Nothing is missing" "poses.csv: not written" -- \
   diagnose --calibration start.yaml --data plain.csv -o n.yaml --json n.json --plan poses.csv
 absent poses.csv
 judge none n.json
 
 # --- too few rows: what fits as well as it must proves nothing ------------------------------------------------------------
 head -n 4 plain.csv >three.csv
-expect 5 "Nothing was found, but these data cannot say that nothing is missing" "not identifiable from these 3 rows" -- \
+expect_all 5 "Nothing was found, but these data cannot say that nothing is missing" "not identifiable from these 3 rows" -- \
   diagnose --data three.csv -o t.yaml --report t.html
 grep -q "Nothing is missing" t.html && fail "t.html: three rows are said to show that nothing is missing"
 
 # --- without context columns: what could not be asked, and what it needs --------------------------------------------------
 without '^(move|temp|time)' <plain.csv >bare.csv
 head -1 bare.csv | grep -q 'move\|temp' && fail "bare.csv has context"
-expect 0 "not tested: readout_lag needs move1_deg … move6_deg" -- diagnose --data bare.csv -o m.yaml --json m.json
+expect_all 0 "not tested: readout_lag needs move1_deg … move6_deg" -- diagnose --data bare.csv -o m.yaml --json m.json
 judge not_testable_names_the_columns m.json
 
 # --- two names for one thing: said, and poses that tell them apart ----------------------------------------------------------
@@ -101,57 +74,57 @@ judge not_testable_names_the_columns m.json
 hidden '{effect: encoder_scale, joint: 3, gain: 1.0e-3}' >scale.yaml
 awk -F, -v OFS=, 'NR > 1 { $3 = $3 / 4 } 1' d.csv | without '^([xyz]_mm|q[wxyz]|sigma)' >narrow_q.csv
 simulate --truth scale.yaml --joints narrow_q.csv --seed 6 -o narrow.csv
-expect 0 -- diagnose --data narrow.csv -o s.yaml --json s.json --plan tell.csv
+expect_all 0 -- diagnose --data narrow.csv -o s.yaml --json s.json --plan tell.csv
 judge every_effect_is_joint_3_s_and_rivals_are_named s.json
 [[ "$(head -1 tell.csv)" = q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg ]] || fail "tell.csv: $(head -1 tell.csv)"
-grep -qF "tell.csv: " said.txt || fail "nothing is said of tell.csv"
-expect 0 "poses of tell.csv" -- "$flexcomp" simulate --robot "$robot" --truth scale.yaml --joints tell.csv -o told.csv
+grep -qF "tell.csv: " out.txt || fail "nothing is said of tell.csv"
+expect_all 0 "poses of tell.csv" -- "$flexcomp" simulate --robot "$robot" --truth scale.yaml --joints tell.csv -o told.csv
 
 # --- what has no name: located, described, and pushed only by who says so -------------------------------------------------------
 # A cable that pulls at joint 3 where joint 2 is near 0 and the hand is loaded.
 hidden '{effect: unnamed, place: link3.theta, of: [q2, payload_kg], grid: [[-100, -40, 0, 40, 100], [0, 1.108]], values_rad: [[0, 0], [0, 0], [0, 1.5e-3], [0, 0], [0, 0]]}' >cable.yaml
 simulate --truth cable.yaml --poses 150 --seed 3 --context --payloads 0,1.108 -o cable.csv
 simulate --truth cable.yaml --poses 60 --seed 4 --context --payloads 0,1.108 -o cable_h.csv
-expect 0 "no effect of the catalogue explains" "link3.theta, joint 3 moves wrongly" "--allow-unnamed" -- \
+expect_all 0 "no effect of the catalogue explains" "link3.theta, joint 3 moves wrongly" "--allow-unnamed" -- \
   diagnose --data cable.csv --holdout cable_h.csv -o k.yaml --json k.json --report k.html
 judge unnamed_where_it_is_and_what_it_follows k.json
-expect 3 "--allow-unnamed" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv
+expect_all 3 "--allow-unnamed" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv
 absent kc.csv
-expect 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv --allow-unnamed
+expect_all 0 "of them ok" -- "$flexcomp" compensate --robot "$robot" --calibration k.yaml --targets cable_h.csv -o kc.csv --allow-unnamed
 
 # --- not to be trusted: noise declared three times too large ----------------------------------------------------------------
 awk -F, -v OFS=, 'NR == 1 { for (k = 1; k <= NF; k++) if ($k ~ /^sigma/) s[k] } NR > 1 { for (k in s) $k *= 3 } 1' plain.csv >wide.csv
-expect 5 "not trustworthy" -- diagnose --data wide.csv -o w.yaml --json w.json --report w.html
+expect_all 5 "not trustworthy" -- diagnose --data wide.csv -o w.yaml --json w.json --report w.html
 for file in w.yaml w.json w.html; do [[ -s $file ]] || fail "$file was not written"; done
 
 # --- bad input: nothing is written ------------------------------------------------------------------------------------------
-expect 2 "--data" -- diagnose -o x.yaml
-expect 2 "--output" -- diagnose --data d.csv
-expect 3 "absent.csv" "a file that can be read" -- diagnose --data absent.csv -o x.yaml
-expect 3 "h.csv" "held-out rows must not be those of --data" "the same file" -- diagnose --data h.csv --holdout ./h.csv -o x.yaml
+expect_all 2 "--data" -- diagnose -o x.yaml
+expect_all 2 "--output" -- diagnose --data d.csv
+expect_all 3 "absent.csv" "a file that can be read" -- diagnose --data absent.csv -o x.yaml
+expect_all 3 "h.csv" "held-out rows must not be those of --data" "the same file" -- diagnose --data h.csv --holdout ./h.csv -o x.yaml
 { cat h.csv; sed -n 9p d.csv; } >mixed.csv
-expect 3 "mixed.csv:62" "the measurement of d.csv:9" -- diagnose --data d.csv --holdout mixed.csv -o x.yaml
+expect_all 3 "mixed.csv:62" "the measurement of d.csv:9" -- diagnose --data d.csv --holdout mixed.csv -o x.yaml
 cut -d, -f1-6 h.csv >joints.csv
-expect 3 "joints.csv:1" "x_mm" -- diagnose --data d.csv --holdout joints.csv -o x.yaml
+expect_all 3 "joints.csv:1" "x_mm" -- diagnose --data d.csv --holdout joints.csv -o x.yaml
 awk -F, -v OFS=, 'NR == 5 { $2 = "nan" } 1' h.csv >nan.csv
-expect 3 "nan.csv:5" "q2_deg" "finite" -- diagnose --data d.csv --holdout nan.csv -o x.yaml
-expect 3 "q5_deg" -- diagnose --data <(cut -d, -f1-4,6- d.csv) -o x.yaml
+expect_all 3 "nan.csv:5" "q2_deg" "finite" -- diagnose --data d.csv --holdout nan.csv -o x.yaml
+expect_all 3 "q5_deg" -- diagnose --data <(cut -d, -f1-4,6- d.csv) -o x.yaml
 "$flexcomp" simulate --robot "$root/host/robots/rx160l.yaml" --truth /dev/stdin --poses 30 --seed 2 -o other.csv --quiet \
   <<<'geometric: [{link: 1, theta_deg: 0.1}]'
 awk -F, 'NR == 1 || !($1 > 180 || $2 > 127 || $3 > 142 || $5 > 122 || $2 < -127 || $3 < -142)' other.csv >other_arm.csv
-expect 3 "other_arm.csv" "another arm" -- diagnose --data d.csv --holdout other_arm.csv -o x.yaml
-expect 3 "other_arm.csv" "another arm" -- diagnose --data other_arm.csv -o x.yaml
+expect_all 3 "other_arm.csv" "another arm" -- diagnose --data d.csv --holdout other_arm.csv -o x.yaml
+expect_all 3 "other_arm.csv" "another arm" -- diagnose --data other_arm.csv -o x.yaml
 simulate --truth harmonic.yaml --poses 20 --seed 8 --frame 500,0,0,0,0,10 -o moved.csv
-expect 3 "moved.csv" "was the instrument moved" -- diagnose --data d.csv --holdout moved.csv -o x.yaml
+expect_all 3 "moved.csv" "was the instrument moved" -- diagnose --data d.csv --holdout moved.csv -o x.yaml
 sed 's/staubli-tx60l/another/' start.yaml >another.yaml
-expect 3 "another.yaml" "staubli-tx60l" -- diagnose --calibration another.yaml --data d.csv -o x.yaml
+expect_all 3 "another.yaml" "staubli-tx60l" -- diagnose --calibration another.yaml --data d.csv -o x.yaml
 sed 's/^nominal_hash: "\?./&0/; s/^\(nominal_hash: "\?.\{64\}\)./\1/' start.yaml >hash.yaml
-expect 3 "hash.yaml" -- diagnose --calibration hash.yaml --data d.csv -o x.yaml
+expect_all 3 "hash.yaml" -- diagnose --calibration hash.yaml --data d.csv -o x.yaml
 absent x.yaml
 
 # A held-out file without the columns that effects follow is judged with defaults, and that is said.
 "$flexcomp" simulate --robot "$robot" --truth harmonic.yaml --poses 30 --seed 9 -o few.csv --quiet
-expect 0 "few.csv: has no payload_kg" -- diagnose --calibration start.yaml --data plain.csv --holdout few.csv -o y.yaml
+expect_all 0 "few.csv: has no payload_kg" -- diagnose --calibration start.yaml --data plain.csv --holdout few.csv -o y.yaml
 
 echo "$failures failures"
 [[ $failures -eq 0 ]]

@@ -3,13 +3,8 @@
 # flexcomp export: the header in the repository is what the command writes, every robot's header is C90 and C++ without
 # a warning, and what cannot be written is refused by name.
 set -u
-flexcomp=$FLEXCOMP_BIN_DIR/flexcomp
-robots=$FLEXCOMP_SOURCE_DIR/host/robots
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder" || exit 1
-failures=0
-fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
+robots=$root/host/robots
 
 "$flexcomp" export --robot "$robots/tx60l.yaml" --as c -o tx60l.h --json tx60l.json --quiet || fail "exit status $?"
 cmp tx60l.h "$FLEXCOMP_SOURCE_DIR/firmware/examples/tx60l.h" ||
@@ -38,29 +33,21 @@ grep -q rust out.txt || fail "the format is not named: $(cat out.txt)"
 "$flexcomp" export --help | grep -q 'flexcomp_init' || fail "the help does not say what to do with the header"
 
 # The other formats: what each needs is a usage error by name, what is no URDF of this arm is refused, files appear whole.
-expect() {
-  local status=$1 message=$2
-  shift 2
-  "$flexcomp" export "$@" >out.txt 2>&1
-  local got=$?
-  [ $got -eq "$status" ] || fail "export $*: exit status $got, expected $status: $(cat out.txt)"
-  grep -qF -- "$message" out.txt || fail "export $*: does not say '$message': $(cat out.txt)"
-}
 data=$FLEXCOMP_SOURCE_DIR/tests/data
-expect 2 "--robot (with --as c) is required" --as c -o x.h
-expect 2 "--calibration (with --as urdf) is required" --as urdf --robot "$robots/tx60l.yaml" -o x.urdf
-expect 2 "--urdf (with --as urdf) is required" --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" -o x.urdf
-expect 2 ".csv, .json or .md" --as modbus -o map.txt
-expect 3 "another arm" --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" --urdf "$data/ur5.urdf" -o x.urdf
+expect 2 "--robot (with --as c) is required" export --as c -o x.h
+expect 2 "--calibration (with --as urdf) is required" export --as urdf --robot "$robots/tx60l.yaml" -o x.urdf
+expect 2 "--urdf (with --as urdf) is required" export --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" -o x.urdf
+expect 2 ".csv, .json or .md" export --as modbus -o map.txt
+expect 3 "another arm" export --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" --urdf "$data/ur5.urdf" -o x.urdf
 [ -e x.urdf ] && fail "a refused URDF leaves a file"
-expect 0 "a URDF cannot hold the rest, up to" --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" \
+expect 0 "a URDF cannot hold the rest, up to" export --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" \
   --urdf "$data/tx60l.urdf" -o corrected.urdf --json urdf.json
-expect 0 "link_gravity" --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" --urdf "$data/tx60l.urdf" -o corrected.urdf
+expect 0 "link_gravity" export --as urdf --robot "$robots/tx60l.yaml" --calibration "$data/tx60l_table1.yaml" --urdf "$data/tx60l.urdf" -o corrected.urdf
 # Back through the import: the corrected URDF is a robot whose geometry is the identified one.
 "$flexcomp" import corrected.urdf -o corrected.yaml --quiet || fail "the corrected URDF is not read"
 grep -q '"largest_mm"' urdf.json || fail "$(cat urdf.json)"
-expect 0 "electronic data sheet" --as eds -o flexcomp.eds
-for ending in csv json md; do expect 0 "register map" --as modbus -o "map.$ending"; done
+expect 0 "electronic data sheet" export --as eds -o flexcomp.eds
+for ending in csv json md; do expect 0 "register map" export --as modbus -o "map.$ending"; done
 /usr/bin/python3 "$FLEXCOMP_SOURCE_DIR"/tests/host/commands/read_exports.py || fail "the data sheet or the map is not read by others"
 
 [ "$failures" -eq 0 ] && echo "headers of $(ls "$robots"/*.yaml | wc -l) robots"

@@ -3,26 +3,7 @@
 # flexcomp import as a user meets it: a URDF becomes a robot file that the other commands take, and what is no arm is
 # refused with the exit status of the contract, in one message, leaving no file.
 set -uo pipefail
-flexcomp="${FLEXCOMP_BIN_DIR:?}/flexcomp"
-root="${FLEXCOMP_SOURCE_DIR:?}"
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-
-fail() {
-  echo "FAIL: $*"
-  failures=$((failures + 1))
-}
-# expect STATUS PATTERN COMMAND…
-expect() {
-  local status=$1 pattern=$2 got
-  shift 2
-  "$flexcomp" "$@" >out.txt 2>&1
-  got=$?
-  [[ $got -eq $status ]] || fail "exit status $got, expected $status: $*: $(cat out.txt)"
-  [[ -z $pattern ]] || grep -qF -- "$pattern" out.txt || fail "$* does not say '$pattern': $(cat out.txt)"
-}
+source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
 
 expect 0 "Example" import --help
 expect 2 "source is required" import -o r.yaml

@@ -2,24 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The command `plan` as a user meets it: files, messages, exit status, stopping and going on.
 set -u
-flexcomp=$FLEXCOMP_BIN_DIR/flexcomp
-robot=$FLEXCOMP_SOURCE_DIR/host/robots/tx60l.yaml
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder" || exit 1
-failures=0
-
-fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
-
-# expect STATUS MESSAGE COMMAND…: exit status, and a text that is in what it says
-expect() {
-  local status=$1 message=$2
-  shift 2
-  "$flexcomp" "$@" >out.txt 2>&1
-  local got=$?
-  [ $got -eq "$status" ] || fail "flexcomp $*: exit status $got, expected $status: $(cat out.txt)"
-  [ -z "$message" ] || grep -qF -- "$message" out.txt || fail "flexcomp $*: does not say '$message': $(cat out.txt)"
-}
+source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
 
 # is FILE EXPRESSION: a statement about a JSON file
 is() { python3 -c "import json,sys; r=json.load(open('$1')); sys.exit(0 if ($2) else 1)" || fail "$1: not so: $2: $(cat "$1")"; }
