@@ -6,6 +6,7 @@
 #include <set>
 
 #include "identification/identifiability.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -68,7 +69,7 @@ Eigen::VectorXd missed_by_rival(const Pair& pair, Eigen::Index measured, const s
     right += pair.rival.middleRows<6>(row).transpose() * pair.chosen.segment<6>(row);
   }
   normal.diagonal().array() += 1e-9 * normal.diagonal().mean();
-  return pair.chosen - pair.rival * normal.ldlt().solve(right);
+  return pair.chosen - pair.rival * Ldlt(normal).solve(right);
 }
 
 }  // namespace

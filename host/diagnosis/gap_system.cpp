@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "linalg/blas.hpp"
+#include "linalg/decompositions.hpp"
 #include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
 
@@ -38,8 +39,8 @@ double rank(const Eigen::MatrixXd& projected, const std::vector<Eigen::Index>& c
     const Eigen::Index c = columns[static_cast<std::size_t>(k)];
     scaled.col(k) = projected.col(c) / whole.col(whole_index[static_cast<std::size_t>(c)]).norm();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram(scaled), Eigen::EigenvaluesOnly);
-  return static_cast<double>((eigen.eigenvalues().array() > nothing_left * nothing_left).count());
+  return static_cast<double>(
+      (symmetric_eigenvalues(gram(scaled)).array() > nothing_left * nothing_left).count());
 }
 
 std::vector<Place> all_places() {
@@ -159,8 +160,7 @@ GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
   }
   const Eigen::Index moved = static_cast<Eigen::Index>(fitted.count());
   const Eigen::Index asked = static_cast<Eigen::Index>(all.parameters.size());
-  out.nuisance = Eigen::HouseholderQR<Eigen::MatrixXd>(lin.derivative.leftCols(moved)).householderQ() *
-                 Eigen::MatrixXd::Identity(lin.derivative.rows(), moved);
+  out.nuisance = orthonormal_basis(lin.derivative.leftCols(moved));
   const Eigen::VectorXd units = units_of(everything, with_places.set);
   for (std::size_t p = 0; p < places.size(); ++p) {
     const Eigen::Index c = moved + asked + static_cast<Eigen::Index>(p);

@@ -3,8 +3,8 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 
+#include "distributions.hpp"
 #include "linalg/blas.hpp"
 
 namespace flexcomp::host {
@@ -75,10 +75,9 @@ std::vector<PlaceShare> place_shares(const GapSystem& system, const ResidualAnal
     if (!(expected > 0.5)) continue;
     // Satterthwaite: a multiple of a chi-square with the same mean and variance.
     const double factor = square / expected;
-    const boost::math::chi_squared noise(expected / factor);
     PlaceShare share;
     share.place = place.place;
-    share.p_value = boost::math::cdf(boost::math::complement(noise, found / factor));
+    share.p_value = chi2_above(found / factor, expected / factor);
     share.explains = beyond > 0 ? std::clamp((found - expected) / beyond, 0.0, 1.0) : 0;
     shares.push_back(share);
   }

@@ -7,6 +7,7 @@
 
 #include "diagnosis/spline.hpp"
 #include "linalg/blas.hpp"
+#include "linalg/decompositions.hpp"
 #include "model/covariate.hpp"
 
 namespace flexcomp::host {
@@ -137,15 +138,15 @@ std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const Resi
       const Eigen::MatrixXd weighted = s.square.cwiseSqrt().asDiagonal() * phi;
       const Eigen::MatrixXd a = (gram(weighted) - gram(product(s.basis, phi))) / left.noise_scale2;
       const Eigen::VectorXd b = phi.transpose() * s.product / left.noise_scale2;
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
-      const Eigen::VectorXd along = eigen.eigenvectors().transpose() * b;
+      const SymmetricEigen eigen = symmetric_eigen(a);
+      const Eigen::VectorXd along = eigen.vectors.transpose() * b;
       SmoothFunction f = kind;
       f.place = {static_cast<std::uint8_t>(j), slot::theta};
       f.gain = -1e300;
       for (const double size : sizes) {
         double gain = -tried;
         for (Eigen::Index k = 0; k < along.size(); ++k) {
-          const double l = std::max(0.0, eigen.eigenvalues()[k]);
+          const double l = std::max(0.0, eigen.values[k]);
           gain += along[k] * along[k] / (l + 1 / (size * size)) - std::log1p(size * size * l);
         }
         if (gain > f.gain) {
@@ -171,14 +172,13 @@ Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::Vecto
     const Eigen::VectorXd size = variance.cwiseSqrt();
     Eigen::MatrixXd normal = size.asDiagonal() * information * size.asDiagonal();
     normal.diagonal().array() += 1;
-    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-    if (factor.info() != Eigen::Success) break;
+    const Llt factor(normal);
+    if (!factor.is_positive_definite()) break;
     const Eigen::VectorXd scaled = size.asDiagonal() * right;
     const Eigen::VectorXd mean = factor.solve(scaled);
-    const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(n, n));
+    const Eigen::MatrixXd covariance = factor.inverse();
     const Eigen::VectorXd determined = 1 - covariance.diagonal().array();
-    gain = mean.dot(scaled) - 2 * factor.matrixLLT().diagonal().array().log().sum() -
-           2 * static_cast<double>((variance.array() > gone).count());
+    gain = mean.dot(scaled) - factor.log_det() - 2 * static_cast<double>((variance.array() > gone).count());
     if (round == rounds) break;
     for (Eigen::Index k = 0; k < n; ++k) {
       const double square = mean[k] * mean[k];

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "linalg/decompositions.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -27,7 +29,7 @@ struct BrokenLine {
       hats(k, cell) = 1 - share;
       hats(k, cell + 1) = share;
     }
-    nearest = (hats.transpose() * hats).llt().solve(hats.transpose());
+    nearest = Llt(hats.transpose() * hats).solve(Eigen::MatrixXd(hats.transpose()));
   }
   Eigen::VectorXd at;
   Eigen::MatrixXd nearest;  ///< node values = nearest * values
