@@ -35,25 +35,28 @@ using Arm = std::vector<Joint>;  ///< from the base to the tip
 
 inline KDL::Vector vector(const Vec3& t) { return {t[0], t[1], t[2]}; }
 
+/// `origin` of the joint in the frame before; the axis, of a joint that moves, in the joint's own frame.
+inline void add_joint(KDL::Chain& chain, const KDL::Frame& origin, bool moves, const KDL::Vector& axis) {
+  // KDL turns about a line of the frame before, as URDF's parser for KDL does.
+  chain.addSegment(KDL::Segment(
+      moves ? KDL::Joint(origin.p, origin.M * axis, KDL::Joint::RotAxis) : KDL::Joint(KDL::Joint::None),
+      origin));
+}
+
 inline KDL::Chain chain_of(const Arm& arm) {
   KDL::Chain chain;
-  for (const Joint& j : arm) {
-    const KDL::Frame origin(KDL::Rotation::RPY(j.rpy_rad[0], j.rpy_rad[1], j.rpy_rad[2]), vector(j.xyz_m));
-    if (j.is_fixed()) {
-      chain.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::None), origin));
-    } else {
-      // KDL turns about a line of the frame before, as URDF's parser for KDL does.
-      chain.addSegment(
-          KDL::Segment(KDL::Joint(origin.p, origin.M * vector(j.axis), KDL::Joint::RotAxis), origin));
-    }
-  }
+  for (const Joint& j : arm)
+    add_joint(chain, {KDL::Rotation::RPY(j.rpy_rad[0], j.rpy_rad[1], j.rpy_rad[2]), vector(j.xyz_m)},
+              !j.is_fixed(), vector(j.axis));
   return chain;
 }
 
 /// The tip in the base.
 class Judge {
  public:
-  explicit Judge(const Arm& arm) : chain_(chain_of(arm)), solver_(chain_) {}
+  explicit Judge(const KDL::Chain& chain) : chain_(chain), solver_(chain_) {}
+  explicit Judge(const Arm& arm) : Judge(chain_of(arm)) {}
+  Judge(const Judge&) = delete;  // the solver keeps a reference to the chain
 
   flexcomp::Pose<double> operator()(const std::array<double, 6>& q) {
     KDL::JntArray joints(6);

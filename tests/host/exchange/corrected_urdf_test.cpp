@@ -11,8 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <kdl/chain.hpp>
-#include <kdl/chainfksolverpos_recursive.hpp>
 #include <string>
 #include <vector>
 
@@ -21,6 +19,7 @@
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
+#include "model/frames.hpp"
 #include "model/host_model.hpp"
 #include "support/arms.hpp"
 #include "support/drawn_arm.hpp"
@@ -36,49 +35,23 @@ using support::replaced;
 const std::string data = FLEXCOMP_SOURCE_DIR "/tests/data/";
 const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
 
-/// The tip of a URDF in one of its links, by liburdfdom and KDL.
-class Judge {
- public:
-  Judge(const std::string& text, const std::string& base, const std::string& tip) {
-    const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
-    if (!model) throw std::runtime_error("no URDF");
-    std::vector<urdf::JointConstSharedPtr> up;
-    for (urdf::LinkConstSharedPtr link = model->getLink(tip); link->name != base; link = link->getParent())
-      up.push_back(link->parent_joint);
-    for (auto joint = up.rbegin(); joint != up.rend(); ++joint) {
-      const urdf::Pose& o = (*joint)->parent_to_joint_origin_transform;
-      const KDL::Frame origin(
-          KDL::Rotation::Quaternion(o.rotation.x, o.rotation.y, o.rotation.z, o.rotation.w),
-          KDL::Vector(o.position.x, o.position.y, o.position.z));
-      if ((*joint)->type == urdf::Joint::FIXED) {
-        chain_.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::None), origin));
-      } else {
-        const urdf::Vector3& a = (*joint)->axis;
-        chain_.addSegment(KDL::Segment(
-            KDL::Joint(origin.p, origin.M * KDL::Vector(a.x, a.y, a.z), KDL::Joint::RotAxis), origin));
-      }
-    }
+/// Judges the tip of a URDF in one of its links, by liburdfdom and KDL.
+drawn::Judge judge_of(const std::string& text, const std::string& base, const std::string& tip) {
+  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
+  if (!model) throw std::runtime_error("no URDF");
+  std::vector<urdf::JointConstSharedPtr> up;
+  for (urdf::LinkConstSharedPtr link = model->getLink(tip); link->name != base; link = link->getParent())
+    up.push_back(link->parent_joint);
+  KDL::Chain chain;
+  for (auto joint = up.rbegin(); joint != up.rend(); ++joint) {
+    const urdf::Pose& o = (*joint)->parent_to_joint_origin_transform;
+    const urdf::Vector3& a = (*joint)->axis;
+    drawn::add_joint(chain,
+                     {KDL::Rotation::Quaternion(o.rotation.x, o.rotation.y, o.rotation.z, o.rotation.w),
+                      KDL::Vector(o.position.x, o.position.y, o.position.z)},
+                     (*joint)->type != urdf::Joint::FIXED, {a.x, a.y, a.z});
   }
-  Pose<double> operator()(const arms::Joints& q) const {
-    KDL::ChainFkSolverPos_recursive solver(chain_);
-    KDL::JntArray joints(6);
-    for (unsigned i = 0; i < 6; ++i) joints(i) = q[i];
-    KDL::Frame frame;
-    if (solver.JntToCart(joints, frame) < 0) throw std::runtime_error("KDL");
-    Pose<double> pose;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) pose.rotation(r, c) = frame.M(r, c);
-      pose.position[r] = frame.p(r);
-    }
-    return pose;
-  }
-
- private:
-  KDL::Chain chain_;
-};
-
-Pose<double> inverse_of(const Pose<double>& p) {
-  return {p.rotation.transpose(), -(p.rotation.transpose() * p.position)};
+  return drawn::Judge(chain);
 }
 
 double apart(const Pose<double>& a, const Pose<double>& b) {
@@ -108,8 +81,8 @@ Calibration some_errors(arms::Random& random) {
 double worst(const std::string& path, const UrdfLinks& links, const Robot& robot, const Calibration& set,
              const CorrectedUrdf& out, int poses, std::uint64_t seed) {
   const UrdfArm arm = load_urdf(path, links);
-  const Judge drawn(support::read(path), arm.base, arm.tip);
-  const Judge exported(out.text, arm.base, out.tip);
+  auto drawn = judge_of(support::read(path), arm.base, arm.tip);
+  auto exported = judge_of(out.text, arm.base, out.tip);
   const auto nominal = prepare(TermSet(), robot, "");
   const auto model = prepare(set.terms, robot, "");
   const auto context = default_context<double>(robot.nominal);
@@ -119,7 +92,7 @@ double worst(const std::string& path, const UrdfLinks& links, const Robot& robot
   const ImportedArm imported = import_urdf(path, links);
   const Pose<double> left = imported.base_to_f0;
   const Pose<double> right =
-      inverse_of(left * forward(*nominal, arms::Joints{}, context, w)) * drawn(arms::Joints{});
+      inverse(left * forward(*nominal, arms::Joints{}, context, w)) * drawn(arms::Joints{});
   arms::Random random(seed);
   double most = 0;
   for (int k = 0; k < poses; ++k) {
@@ -161,8 +134,8 @@ TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
     std::erase_if(set.terms.terms, [](const Term<double>& t) { return t.place.body == body::tool; });
     const CorrectedUrdf out = correct_urdf(data + urdf, {}, robot, set);
     const UrdfArm arm = load_urdf(data + urdf, {});
-    const Judge drawn(support::read(data + urdf), arm.base, arm.tip);
-    const Judge exported(out.text, arm.base, out.tip);
+    auto drawn = judge_of(support::read(data + urdf), arm.base, arm.tip);
+    auto exported = judge_of(out.text, arm.base, out.tip);
     const auto nominal = prepare(TermSet(), robot, "");
     const auto model = prepare(set.terms, robot, "");
     const auto context = default_context<double>(robot.nominal);
@@ -195,15 +168,15 @@ TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
     for (int k = 0; k < 50; ++k) {
       arms::Joints q{};
       for (double& v : q) v = random.around(2);
-      const Pose<double> motion = forward(*nominal, q, context, w) * inverse_of(n0);
-      const Pose<double> theirs = drawn(q) * inverse_of(drawn(zero));
+      const Pose<double> motion = forward(*nominal, q, context, w) * inverse(n0);
+      const Pose<double> theirs = drawn(q) * inverse(drawn(zero));
       const Eigen::Matrix3d a = theirs.rotation - Eigen::Matrix3d::Identity();
       const Eigen::Vector3d b = left.rotation * motion.position - theirs.position;
       normal += a.transpose() * a;
       right_side += a.transpose() * b;
     }
     left.position = normal.ldlt().solve(right_side);
-    const Pose<double> right = inverse_of(left * n0) * drawn(zero);
+    const Pose<double> right = inverse(left * n0) * drawn(zero);
     double most = 0;
     double least = 1;
     for (int k = 0; k < 200; ++k) {
