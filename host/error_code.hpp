@@ -27,7 +27,7 @@ enum class ErrorCode {
   implausible_data,
   distant_base,
   held_out_was_fitted,
-  improbable_chi_square,
+  poor_fit,  ///< chi-square outside its interval, or a fit that did not converge
   // report/
   no_result_file,
   // bus/

@@ -17,7 +17,7 @@ std::string accuracy_table(const Before& before, const ErrorStatistics& after);
 /// The same of an arm that was driven with corrected commands: one line.
 std::string accuracy_table(const ErrorStatistics& corrected);
 
-/// Says where rows do not count in full: their lines, the first eight of them.
+/// Warns of down-weighted rows by their lines, the first eight of them.
 void add_outlier_warning(std::vector<std::string>& warnings, const std::string& data,
                          const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers);
 

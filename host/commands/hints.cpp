@@ -196,7 +196,7 @@ std::string hint(const std::exception& error, const std::string& command) {
   if (const auto* input = dynamic_cast<const InputError*>(&error)) return of_input(*input, command);
   if (const auto* bus = dynamic_cast<const BusError*>(&error)) return of_bus(*bus);
   const auto* doubtful = dynamic_cast<const DoubtfulResult*>(&error);
-  if (doubtful != nullptr && doubtful->code() == ErrorCode::improbable_chi_square)
+  if (doubtful != nullptr && doubtful->code() == ErrorCode::poor_fit)
     return "\"flexcomp diagnose\" with the same robot and data looks for the effect that the model lacks";
   return {};
 }

@@ -89,7 +89,7 @@ void Identify::run() const {
   });
   if (r.doubts.empty()) return;
   throw DoubtfulResult(fmt::format("{}: not trustworthy: {}", out, doubts_text(r)),
-                       r.fit.converged ? ErrorCode::none : ErrorCode::improbable_chi_square);
+                       r.fit.converged ? ErrorCode::none : ErrorCode::poor_fit);
 }
 
 }  // namespace

@@ -61,10 +61,9 @@ void Validate::run() const {
                      {"degrees_of_freedom", v.degrees_of_freedom}});
   common.write_report(report, [&] { return page_of(v, rows, robot_file, set, data); });
   if (!v.doubts.empty()) {
-    throw DoubtfulResult(fmt::format("{}: {}", calibration, joined(v.doubts)),
-                         chi_square_is_usual(v.chi2, v.degrees_of_freedom)
-                             ? ErrorCode::none
-                             : ErrorCode::improbable_chi_square);
+    throw DoubtfulResult(
+        fmt::format("{}: {}", calibration, joined(v.doubts)),
+        chi_square_is_usual(v.chi2, v.degrees_of_freedom) ? ErrorCode::none : ErrorCode::poor_fit);
   }
 }
 

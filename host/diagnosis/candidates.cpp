@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/candidates.hpp"
-#include "model/effects/descriptor.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +7,8 @@
 #include <numeric>
 #include <string>
 #include <utility>
+
+#include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
 

@@ -32,7 +32,7 @@ class EffectSearch {
   SearchResult run_again(const Refit& refit, const SearchResult& found) const;
 
  private:
-  /// A search in turns with the refit that decides which rows count in full.
+  /// Searches in turns with the refit that decides which rows are down-weighted.
   struct Settled {
     SearchResult found;
     Refit refit;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diagnosis/found_effects.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "model/covariate.hpp"
 #include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
-
-#include <fmt/format.h>
-#include <algorithm>
-#include <cmath>
 
 namespace flexcomp::host {
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "measurement/reflectors.hpp"
-#include "model/frames.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include "distributions.hpp"
 #include "linalg/decompositions.hpp"
 #include "linalg/nearest_rotation.hpp"
+#include "model/frames.hpp"
 
 namespace flexcomp::host {
 

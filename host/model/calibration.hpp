@@ -21,7 +21,7 @@ namespace flexcomp::host {
 
 struct Confounded {
   std::string parameter;          ///< was left out
-  std::vector<std::string> with;  ///< and is carried by these
+  std::vector<std::string> with;  ///< which absorb it
 };
 
 /// A parameter whose estimate is the least that physics allows (a compliance of zero).

@@ -26,7 +26,7 @@ struct PagePose {
   std::array<double, 3> after_m{};
   std::optional<double> before_rad;  ///< angle of the rotation error, where orientations are known
   std::optional<double> after_rad;
-  bool outlier = false;  ///< does not count in full
+  bool outlier = false;  ///< down-weighted
   std::size_t line = 0;  ///< of the data file; 0: unknown
 };
 

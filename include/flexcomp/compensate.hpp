@@ -9,7 +9,7 @@
 /// the error that remains is in the orientation (detail/damped_jacobian_solver.hpp).
 ///
 /// The correction is continuous in the command but for what one step more or less of an iteration changes:
-/// 1e-9 rad where the arm is regular. core_compensation_test bounds its slope through the singularities.
+/// 1e-9 rad where the arm is regular. tests/core/compensation_test.cpp bounds its slope through the singularities.
 #ifndef FLEXCOMP_COMPENSATE_HPP
 #define FLEXCOMP_COMPENSATE_HPP
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "judge.hpp"
-#include "model/covariate.hpp"
-#include "model/place.hpp"
 
 #include <fmt/format.h>
 #include <time.h>
@@ -10,6 +8,9 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <chrono>
 #include <cmath>
+
+#include "model/covariate.hpp"
+#include "model/place.hpp"
 
 namespace judging {
 

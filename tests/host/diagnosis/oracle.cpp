@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "oracle.hpp"
-#include "model/covariate.hpp"
-#include "model/paper_model.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -10,6 +8,8 @@
 
 #include "identification/identifiability.hpp"
 #include "identification/prior_knowledge.hpp"
+#include "model/covariate.hpp"
+#include "model/paper_model.hpp"
 
 namespace judging {
 
