@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Failures of the calibrator and the exit status of each (mapped in main.cpp only).
+/// Failures of the calibrator and the exit status of each (mapped in run() of commands/ only).
 #ifndef FLEXCOMP_HOST_ERRORS_HPP
 #define FLEXCOMP_HOST_ERRORS_HPP
 

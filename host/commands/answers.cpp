@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "files/csv.hpp"
+#include "json.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -31,9 +31,9 @@ std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& 
   return text;
 }
 
-nlohmann::ordered_json answers_summary(const std::vector<std::array<double, joint_count>>& commands,
-                                       const std::vector<Answer>& answers) {
-  nlohmann::ordered_json status;
+Json answers_summary(const std::vector<std::array<double, joint_count>>& commands,
+                     const std::vector<Answer>& answers) {
+  Json status;
   for (const StepStatus s : {StepStatus::ok, StepStatus::near_singular, StepStatus::limited,
                              StepStatus::at_limit, StepStatus::no_set, StepStatus::refused}) {
     status[name(s)] =

@@ -5,11 +5,11 @@
 #define FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP
 
 #include <array>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "files/data_file.hpp"
+#include "json.hpp"
 #include "kinematics/compensated_targets.hpp"
 
 namespace flexcomp::host {
@@ -19,8 +19,8 @@ std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& 
 
 /// Numbers over all answers: counts by status, largest correction, mean and largest residual. `commands` are the joint
 /// commands that were answered.
-nlohmann::ordered_json answers_summary(const std::vector<std::array<double, joint_count>>& commands,
-                                       const std::vector<Answer>& answers);
+Json answers_summary(const std::vector<std::array<double, joint_count>>& commands,
+                     const std::vector<Answer>& answers);
 
 }  // namespace flexcomp::host
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The commands of `flexcomp`. Each lives in commands/NAME.cpp and adds itself as a subcommand whose callback does the
-/// work; what goes wrong is thrown (errors.hpp) and becomes an exit status in main.cpp.
+/// work; what goes wrong is thrown (errors.hpp) and becomes an exit status in run().
 ///
 /// A command is thin: options in, one library call, then text, JSON and page out. Where the rest is:
 /// - JSON of a result beside its type: MODULE/RESULT_json (planning/plan_json.hpp).
@@ -11,9 +11,14 @@
 #ifndef FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
 #define FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace flexcomp::host {
+
+/// The whole of `flexcomp`: reads the command line, runs one command and turns what was thrown into the exit status.
+int run(int argc, char** argv);
 
 void add_simulate(CLI::App& app);
 void add_plan(CLI::App& app);

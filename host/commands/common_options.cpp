@@ -5,10 +5,10 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "commands/colour.hpp"
 #include "files/write_file.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 
@@ -32,7 +32,7 @@ void CommonOptions::warn(const std::vector<std::string>& warnings) const {
     fmt::print(stderr, "{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w);
 }
 
-void CommonOptions::write_json(const nlohmann::ordered_json& result) const {
+void CommonOptions::write_json(const Json& result) const {
   if (!json.empty()) write_file(json, result.dump(2) + "\n");
 }
 

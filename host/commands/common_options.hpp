@@ -7,10 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "json.hpp"
 #include "measurement/measured_data.hpp"
 #include "model/paper_model.hpp"
 #include "named_values.hpp"
@@ -31,7 +31,7 @@ struct CommonOptions {
   /// Warnings go to standard error, also when quiet: they say that something may be wrong.
   void warn(const std::vector<std::string>& warnings) const;
   /// The result as a file, where one is asked for.
-  void write_json(const nlohmann::ordered_json& result) const;
+  void write_json(const Json& result) const;
   /// The page that `make` gives as a file, where one is asked for, with a line that says so.
   void write_report(const std::string& path, const std::function<Page()>& make) const;
 };

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
+#include "json.hpp"
 #include "kinematics/compensated_targets.hpp"
 #include "kinematics/nominal_inverse.hpp"
 #include "units.hpp"
@@ -56,7 +56,7 @@ void Compensate::run() {
     common.warn({fmt::format("{}:{}: {}{} is {}.", targets, list.rows[k].line, target,
                              target.empty() ? "the target" : "", name(answers[k].status))});
   }
-  const nlohmann::ordered_json summary = answers_summary(commands, answers);
+  const Json summary = answers_summary(commands, answers);
   common.say(fmt::format(
       "{}: {} corrected commands, {} of them ok; largest correction {:.4f} deg, largest residual {:.2g} mm",
       out, answers.size(), summary["status"]["ok"].get<int>(),

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -22,6 +21,7 @@
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
+#include "json.hpp"
 #include "report/results.hpp"
 
 namespace flexcomp::host {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "commands/commands.hpp"
@@ -17,6 +16,7 @@
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
+#include "json.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -83,7 +83,7 @@ void Export::corrected_urdf() const {
   common.say(fmt::format(
       "{}: {} with the origins of {} joints corrected; its link {} moves as Ftool of {}, seen from {}", out,
       urdf, corrected.joints.size(), corrected.tip, calibration, corrected.base));
-  nlohmann::ordered_json joints = nlohmann::ordered_json::array();
+  Json joints = Json::array();
   for (const CorrectedUrdf::Joint& j : corrected.joints) {
     common.say(fmt::format("  {:<24} moved {:>9.4f} mm, turned {:>9.5f} deg", j.name, j.moved_m * 1e3,
                            degrees(j.turned_rad)));
@@ -94,7 +94,7 @@ void Export::corrected_urdf() const {
     common.say(fmt::format("  nothing fixed lies between joint 6 and the tip: the link {} was added for it",
                            corrected.tip));
   }
-  nlohmann::ordered_json effects = nlohmann::ordered_json::array();
+  Json effects = Json::array();
   if (left.effects.empty()) {
     common.say("  the calibration is rigid: the URDF holds all of it");
   } else {

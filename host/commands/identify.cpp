@@ -3,7 +3,6 @@
 
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "commands/accuracy.hpp"
@@ -17,6 +16,7 @@
 #include "files/robot_file.hpp"
 #include "files/tolerance_file.hpp"
 #include "identification/identification_json.hpp"
+#include "json.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"
 #include "units.hpp"
@@ -136,7 +136,8 @@ void add_identify(CLI::App& app) {
   command->add_flag(
       "--unbounded", options->unbounded,
       "Compliances may come out negative (default: as small as zero, with a one-sided interval)");
-  command->add_flag("--plain", options->plain, "Every row counts in full: no protection from outliers");
+  command->add_flag("--plain", options->plain,
+                    "Ordinary least squares: every row has weight 1, outliers too");
   command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
   add_force_option(*command, options->force);
   options->common.add_seed_to(*command);
@@ -144,7 +145,7 @@ void add_identify(CLI::App& app) {
   command->footer(
       "Example:\n  flexcomp identify --robot tx60l.yaml --data measured.csv -o cal.yaml\n"
       "Exit status 5: the calibration was written, but the data know less than random poses would (the "
-      "message names what is missing and poses that cure it), or the fit did not converge.");
+      "message names what is missing and poses that would identify it), or the fit did not converge.");
   command->callback([options] { options->run(); });
 }
 

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 #include "quaternion.hpp"
 #include "units.hpp"
 
@@ -109,7 +109,7 @@ void Import::run() const {
     common.say(fmt::format("  F0 is not {}: the axis of joint 1 is not the z axis there. F0 seen from it: {}",
                            arm.base, f0.text()));
   }
-  nlohmann::ordered_json result{{"robot", arm.robot.name}};
+  Json result{{"robot", arm.robot.name}};
   if (!from_robot_file) {
     result.update({{"base", arm.base}, {"flange", arm.flange}, {"tip", arm.tip}, {"joints", arm.joints}});
   }

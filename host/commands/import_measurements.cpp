@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "commands/numbers.hpp"
 #include "exchange/declared_unit.hpp"
@@ -16,6 +15,7 @@
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -185,7 +185,7 @@ void ImportMeasurements::run(const CommonOptions& common, const std::string& sou
                   log.unused.empty() ? "" : fmt::format("; not read: {}", fmt::join(log.unused, ", "))));
   list(common, fmt::format("points of {} without joint readings, left out", source), joining.lonely_points);
   list(common, fmt::format("rows of {} at which nothing was measured", joints), joining.lonely_rows);
-  nlohmann::ordered_json result{{"output", out}};
+  Json result{{"output", out}};
   result.update(to_json(joining, points, log, joining_options.by));
   common.write_json(result);
 }

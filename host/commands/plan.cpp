@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +18,7 @@
 #include "files/cell_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
+#include "json.hpp"
 #include "planning/plan_json.hpp"
 #include "report/plan_page.hpp"
 

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "commands/commands.hpp"
@@ -11,6 +10,7 @@
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
+#include "json.hpp"
 #include "kinematics/measured_pose.hpp"
 #include "quaternion.hpp"
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "bus/transfer.hpp"
@@ -16,6 +15,7 @@
 #include "files/data_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"
+#include "json.hpp"
 #include "kinematics/nominal_inverse.hpp"
 
 namespace flexcomp::host {
@@ -87,7 +87,7 @@ void Probe::run() const {
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_file(out, answers_text(list, answers));
-  nlohmann::ordered_json summary{{"bus", client->where()}, {"sequence", sequence}, {"seconds", took.count()}};
+  Json summary{{"bus", client->where()}, {"sequence", sequence}, {"seconds", took.count()}};
   summary.update(answers_summary(commands, answers));
   bus.say(fmt::format(
       "{}: {} targets answered by set {} in {:.2f} s, {} of them ok; largest correction {:.4f} deg, "

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "bus/transfer.hpp"
@@ -12,6 +11,7 @@
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/write_file.hpp"
+#include "json.hpp"
 #include "model/parameter_image.hpp"
 
 namespace flexcomp::host {
@@ -34,7 +34,7 @@ struct Pull {
       bytes = pull_image(*client, bar.callback());
     }
     if (!image.empty()) write_file(image, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    nlohmann::ordered_json result{{"bus", client->where()}, {"bytes", bytes.size()}};
+    Json result{{"bus", client->where()}, {"bytes", bytes.size()}};
     const std::uint32_t sequence = client->status().active_sequence;
     result["sequence"] = sequence;
     if (!out.empty()) {

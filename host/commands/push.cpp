@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "files/calibration_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"
+#include "json.hpp"
 #include "model/parameter_image.hpp"
 
 namespace flexcomp::host {
@@ -63,7 +63,7 @@ void Push::run() const {
   // A file that cannot be read is said before anybody is asked.
   const std::optional<Bytes> ready = confirm ? std::nullopt : read_image_file(set);
   const std::unique_ptr<ControllerClient> client = bus.connect();
-  nlohmann::ordered_json result{{"bus", client->where()}};
+  Json result{{"bus", client->where()}};
   if (confirm) {
     client->run(wire::Command::confirm);
     const std::uint32_t active = client->status().active_sequence;

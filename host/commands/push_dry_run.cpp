@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "commands/difference_text.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/robot_file.hpp"
+#include "json.hpp"
 #include "model/parameter_image.hpp"
 #include "model/set_difference_json.hpp"
 
@@ -30,7 +30,7 @@ TermSet held_set(const std::string& path, const Robot& robot, const ImageOptions
 
 /// Reads and compares; not one byte is written to the controller.
 void Push::show_changes() const {
-  nlohmann::ordered_json result{{"dry_run", true}};
+  Json result{{"dry_run", true}};
   std::vector<std::string> left_out;
   Robot for_robot;
   TermSet now;

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 #include "report/parameters.hpp"
 #include "report/results.hpp"
 #include "report/stored_results.hpp"

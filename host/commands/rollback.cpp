@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 namespace {

@@ -3,7 +3,6 @@
 
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
 #include "flexcomp/model.hpp"
+#include "json.hpp"
 #include "measurement/simulation.hpp"
 #include "units.hpp"
 

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
 #include "flexcomp/bytes.hpp"
+#include "json.hpp"
 #include "model/calibration.hpp"
 
 namespace flexcomp::host {
@@ -48,7 +48,7 @@ void show_status(const BusOptions& bus) {
     faults.emplace_back(f.name);
     fault_lines += fmt::format("\n  fault      {}", f.words);
   }
-  nlohmann::ordered_json cycles_by_status;
+  Json cycles_by_status;
   std::string cycles;
   for (std::size_t k = 0; k < now.cycles_by_status.size(); ++k) {
     const char* name = flexcomp::name(static_cast<StepStatus>(k));
@@ -81,7 +81,7 @@ void show_status(const BusOptions& bus) {
 
   bus.write_json({
       {"bus", client->where()},
-      {"robot", robot ? nlohmann::ordered_json(robot->name) : nlohmann::ordered_json(nullptr)},
+      {"robot", robot ? Json(robot->name) : Json(nullptr)},
       {"nominal_hash", hex(can.nominal_hash)},
       {"name_hash", hex(can.name_hash)},
       {"firmware", version(can.firmware)},
@@ -91,8 +91,7 @@ void show_status(const BusOptions& bus) {
       {"detail", now.detail},
       {"faults", faults},
       {"active",
-       {{"slot", now.active_slot == wire::no_slot ? nlohmann::ordered_json(nullptr)
-                                                  : nlohmann::ordered_json(now.active_slot)},
+       {{"slot", now.active_slot == wire::no_slot ? Json(nullptr) : Json(now.active_slot)},
         {"sequence", now.active_sequence},
         {"bytes", now.active_bytes},
         {"crc", fmt::format("{:08x}", now.active_crc)},

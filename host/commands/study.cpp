@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "studies/study.hpp"
 #include "commands/outputs.hpp"
+#include "json.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +9,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -93,13 +93,13 @@ std::string text_of(const Table& table) {
   return text;
 }
 
-nlohmann::ordered_json json_of(const Study& study, const StudyOptions& options) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+Json json_of(const Study& study, const StudyOptions& options) {
+  Json rows = Json::array();
   for (const StudyRow& row : study.rows) {
-    nlohmann::ordered_json j;
+    Json j;
     for (std::size_t k = 0; k < row.labels.size(); ++k) j[study.label_names[k]] = row.labels[k];
     const auto put = [&](const char* key, const std::optional<double>& value) {
-      j[key] = value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+      j[key] = value ? Json(*value) : Json();
     };
     put("paper", row.paper);
     put("ours", row.ours);

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "commands/accuracy.hpp"
@@ -15,6 +14,7 @@
 #include "files/robot_file.hpp"
 #include "identification/identification_json.hpp"
 #include "identification/validate.hpp"
+#include "json.hpp"
 #include "measurement/observation.hpp"
 #include "report/results.hpp"
 

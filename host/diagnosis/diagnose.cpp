@@ -91,7 +91,7 @@ std::vector<std::string> notes_of(const SearchResult& found, const std::vector<s
   notes.insert(notes.end(), found.notes.begin(), found.notes.end());
   if (!outliers.empty())
     notes.push_back(
-        fmt::format("{} of {} rows are outliers and do not count in full", outliers.size(), rows.size()));
+        fmt::format("{} of {} rows are outliers and down-weighted", outliers.size(), rows.size()));
   return notes;
 }
 

@@ -2,18 +2,16 @@
 #include "diagnosis/diagnosis_json.hpp"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "diagnosis/messages.hpp"
+#include "json.hpp"
 #include "model/covariate.hpp"
 #include "model/place.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 const char* word(Verdict v) {
   return v == Verdict::none ? "none" : v == Verdict::named ? "named" : "unnamed";

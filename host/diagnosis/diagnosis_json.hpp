@@ -4,18 +4,18 @@
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/held_out.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 
 /// \param rows  those that were diagnosed: outliers are given by their lines
-nlohmann::ordered_json to_json(const Diagnosis& d, const std::vector<Observation>& rows,
-                               const std::optional<HeldOut>& holdout, const Robot& robot);
+Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std::optional<HeldOut>& holdout,
+             const Robot& robot);
 
 }  // namespace flexcomp::host
 

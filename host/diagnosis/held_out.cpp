@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "files/data_file.hpp"
 #include "identification/validate.hpp"
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -37,7 +37,7 @@ double noise_floor_m(const std::vector<Observation>& rows) {
   double sum = 0;
   for (const Observation& row : rows) {
     if (row.has_orientation) {
-      const Matrix6d root = row.whitening.inverse();
+      const Matrix6d root = inverse(row.whitening);
       sum += (root * root.transpose()).topLeftCorner<3, 3>().trace();
     } else {
       const Eigen::Matrix3d root = row.whitening.topLeftCorner<3, 3>().inverse();

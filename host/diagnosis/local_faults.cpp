@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diagnosis/spline.hpp"
+#include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
@@ -119,10 +120,10 @@ std::vector<Slip> slips(const GapSystem& system, const ResidualAnalysis& left,
     const Eigen::Index before = order[static_cast<std::size_t>(i + 1)];
     if (!(time(before) < time(k)) || i < 4 || i + 6 > n) continue;
     const Eigen::Matrix3d a = normal - basis.transpose() * basis;
-    const Eigen::LLT<Eigen::Matrix3d> factor(a);
-    if (factor.info() != Eigen::Success) continue;
-    all.push_back(
-        {0.5 * (time(before) + time(k)), right.dot(factor.solve(right)) / left.noise_scale2 - 4 * log_n});
+    const Llt factor(a);
+    if (!factor.is_positive_definite()) continue;
+    all.push_back({0.5 * (time(before) + time(k)),
+                   right.dot(factor.solve(Eigen::VectorXd(right))) / left.noise_scale2 - 4 * log_n});
   }
   keep_best(all, most);
   return all;

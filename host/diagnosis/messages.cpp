@@ -94,11 +94,11 @@ std::string where_sentence(const Misfit& where) {
 std::string verdict_sentence(const Diagnosis& d) {
   if (d.verdict == Verdict::none) {
     if (!d.doubts.empty()) return "Nothing was found, but these data cannot say that nothing is missing.";
-    return fmt::format(
-        "Nothing is missing: the model explains these data down to their noise{}.",
-        d.outliers.empty()
-            ? ""
-            : fmt::format(", but for {} rows far outside it that do not count in full", d.outliers.size()));
+    return fmt::format("Nothing is missing: the model explains these data down to their noise{}.",
+                       d.outliers.empty()
+                           ? ""
+                           : fmt::format(", but for {} outliers far outside it, which are down-weighted",
+                                         d.outliers.size()));
   }
   std::vector<std::string> named;
   for (const FoundEffect& e : d.effects) {

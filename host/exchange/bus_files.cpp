@@ -5,7 +5,6 @@
 
 #include <array>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "flexcomp/wire/canopen_dictionary.hpp"
 #include "flexcomp/wire/modbus_blocks.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 
@@ -362,12 +362,12 @@ std::string register_map_markdown() {
   return text;
 }
 
-nlohmann::ordered_json register_map_json() {
-  nlohmann::ordered_json out;
+Json register_map_json() {
+  Json out;
   out["byte_order"] = "big";
   out["read_functions"] = {3, 4};
   out["write_functions"] = {6, 16, 23};
-  out["registers"] = nlohmann::ordered_json::array();
+  out["registers"] = Json::array();
   for (const Register& r : register_map()) {
     out["registers"].push_back({{"address", r.address},
                                 {"registers", r.registers},

@@ -7,9 +7,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include "json.hpp"
 
 namespace flexcomp::host {
 
@@ -35,7 +36,7 @@ std::vector<Register> register_map();
 
 std::string register_map_csv();
 std::string register_map_markdown();
-nlohmann::ordered_json register_map_json();
+Json register_map_json();
 
 }  // namespace flexcomp::host
 

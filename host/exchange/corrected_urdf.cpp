@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,6 +20,7 @@
 #include "flexcomp/forward.hpp"
 #include "flexcomp/model.hpp"
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 #include "linalg/nearest_rotation.hpp"
 #include "model/effects.hpp"
 #include "model/frames.hpp"
@@ -55,7 +55,7 @@ Pose<double> carry(const AxisChain& from, const AxisChain& to) {
     normal += across;
     right += across * (to.axes[i].point_m - out.rotation * from.axes[i].point_m);
   }
-  out.position = normal.completeOrthogonalDecomposition().solve(right);
+  out.position = shortest_least_squares(normal, right);
   return out;
 }
 

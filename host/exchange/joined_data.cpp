@@ -8,12 +8,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "files/data_file.hpp"
 #include "files/write_file.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 
@@ -57,8 +57,7 @@ std::vector<std::string> check_joined(const std::string& text, const std::string
   }
 }
 
-nlohmann::ordered_json to_json(const Joining& joining, const PointList& points, const RobotLog& log,
-                               JoinBy by) {
+Json to_json(const Joining& joining, const PointList& points, const RobotLog& log, JoinBy by) {
   return {{"rows", joining.data.rows.size()},
           {"measured", measured_name(joining.data.kind)},
           {"join", name_in(join_names, by)},

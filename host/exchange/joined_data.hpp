@@ -5,13 +5,13 @@
 #define FLEXCOMP_HOST_EXCHANGE_JOINED_DATA_HPP
 
 #include <map>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "exchange/joining.hpp"
 #include "exchange/point_list.hpp"
 #include "exchange/robot_log.hpp"
+#include "json.hpp"
 #include "named_values.hpp"
 
 namespace flexcomp::host {
@@ -28,8 +28,7 @@ std::vector<std::string> check_joined(const std::string& text, const std::string
                                       const PointList& points, const RobotLog& log, const Joining& joining,
                                       bool force);
 
-nlohmann::ordered_json to_json(const Joining& joining, const PointList& points, const RobotLog& log,
-                               JoinBy by);
+Json to_json(const Joining& joining, const PointList& points, const RobotLog& log, JoinBy by);
 
 }  // namespace flexcomp::host
 

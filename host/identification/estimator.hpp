@@ -47,7 +47,7 @@ struct Fit {
   /// Singular values of the whitened, scaled derivative of the parameters (frames projected out).
   Eigen::VectorXd singular_values;
 
-  /// Per row: whether it counts in full (docs/model.md, M39: weight 1). All of `rows` where nothing was fitted.
+  /// Per row: whether its weight is 1 (docs/model.md, M39). All of `rows` where nothing was fitted.
   std::vector<bool> has_full_weight(std::size_t rows) const;
   /// Rows that are down-weighted, by index.
   std::vector<std::size_t> outliers() const;

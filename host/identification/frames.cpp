@@ -8,6 +8,7 @@
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
 #include "identification/statistics.hpp"
+#include "linalg/decompositions.hpp"
 #include "linalg/nearest_rotation.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
@@ -64,7 +65,7 @@ void solve_translations(const std::vector<Observation>& rows, const std::vector<
     right += a.transpose() * (rows[k].p_m - f.rotation * model[k].position);
   }
   // With one orientation only the sum of the two is identifiable: the minimum-norm solution.
-  const Vector6<double> x = normal.completeOrthogonalDecomposition().solve(right);
+  const Vector6<double> x = shortest_least_squares(normal, right);
   f.position = x.head<3>();
   e.position = x.tail<3>();
 }

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "identification/identification_json.hpp"
 
-#include <nlohmann/json.hpp>
-
 #include "identification/fitted_parameters.hpp"
+#include "json.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json confounded_json(const std::vector<Confounded>& list) {
   Json j = Json::array();

@@ -4,21 +4,21 @@
 #ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFICATION_JSON_HPP
 #define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFICATION_JSON_HPP
 
-#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "identification/identify.hpp"
+#include "json.hpp"
 
 namespace flexcomp::host {
 
 /// {"mean_mm", "rms_mm", "max_mm", "mean_deg"} (the last only where orientations were measured).
-nlohmann::ordered_json to_json(const ErrorStatistics& s);
+Json to_json(const ErrorStatistics& s);
 
 /// {"nominal_frames": {…}, "fitted_frames": {…}}
-nlohmann::ordered_json to_json(const Before& before);
+Json to_json(const Before& before);
 
 /// \param rows  those that were fitted: outliers are given by their lines
-nlohmann::ordered_json to_json(const Identification& r, const std::vector<Observation>& rows);
+Json to_json(const Identification& r, const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host
 

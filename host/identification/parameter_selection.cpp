@@ -106,7 +106,7 @@ std::vector<SuggestedPose> suggest_poses(WeaknessTest test, const Eigen::MatrixX
       const auto h = reference.middleRows<6>(6 * c);
       const Eigen::Matrix<double, 6, 6> gain =
           Eigen::Matrix<double, 6, 6>::Identity() + h * covariance * h.transpose();
-      const double gained = gain.llt().matrixLLT().diagonal().array().log().sum();
+      const double gained = Llt(gain).log_det();
       if (gained > best) {
         best = gained;
         which = c;

@@ -6,6 +6,7 @@
 
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
+#include "linalg/decompositions.hpp"
 #include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
 #include "units.hpp"
@@ -64,9 +65,9 @@ Vector6<double> whitened(const Observation& row, const RowResidual& residual) {
 }
 
 Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
-  if (row.has_orientation) return row.whitening.partialPivLu().solve(whitened);
+  const Eigen::Index n = row.has_orientation ? 6 : 3;
   Vector6<double> e = Vector6<double>::Zero();
-  e.head<3>() = row.whitening.topLeftCorner<3, 3>().partialPivLu().solve(whitened.head<3>());
+  e.head(n) = inverse(row.whitening.topLeftCorner(n, n)) * whitened.head(n);
   return e;
 }
 

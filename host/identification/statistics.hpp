@@ -22,7 +22,7 @@ struct ErrorStatistics {
 
 ErrorStatistics statistics(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows);
 
-/// Chi-square: sum of squared whitened residuals, Eq. (M22).
+/// Chi-square: sum of squared whitened residuals, of all rows given (M42, M51).
 double chi_square(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows);
 
 /// Numbers measured by a row: 6 for a pose, 3 for a position.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kinematics/nominal_inverse.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +8,7 @@
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 #include "quaternion.hpp"
 #include "units.hpp"
 
@@ -58,7 +58,7 @@ std::optional<JointVector> nominal_inverse(const NominalRobot<joint_count>& robo
       const Place theta{static_cast<std::uint8_t>(j + 1), slot::theta};
       jacobian.col(static_cast<Eigen::Index>(j)) = screw(model, at, theta);
     }
-    Vector6<double> step = jacobian.completeOrthogonalDecomposition().solve(error);
+    Vector6<double> step = shortest_least_squares(jacobian, error);
     step *= std::min(1.0, longest_step_rad / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
     if (!step.allFinite()) return {};
     for (std::size_t j = 0; j < joint_count; ++j) q[j] += step[static_cast<Eigen::Index>(j)];

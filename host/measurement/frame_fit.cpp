@@ -44,7 +44,7 @@ FrameFit fit_frame(std::span<const Eigen::Vector3d> tracker_m, std::span<const E
   }
   FrameFit out;
   out.pose = fit_rigid(nominal_m, tracker_m, sigma_m).pose;
-  out.covariance = fit_information(out.pose, tracker_m, sigma_m).inverse();
+  out.covariance = inverse(fit_information(out.pose, tracker_m, sigma_m));
   for (std::size_t k = 0; k < n; ++k) {
     out.residual_m.emplace_back(nominal_m[k] - out.pose.rotation * tracker_m[k] - out.pose.position);
     out.chi2 += out.residual_m.back().squaredNorm() / (sigma_m[k] * sigma_m[k]);

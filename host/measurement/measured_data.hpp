@@ -46,8 +46,7 @@ struct ContextColumns {
   bool orientation_sigma = false;
   std::array<bool, 3> force{};
 
-  bool all_moves() const;       ///< relative speeds are known
-  bool all_directions() const;  ///< a direction column or a motion for every joint
+  bool all_moves() const;  ///< relative speeds are known
 };
 
 /// Rows of one file.

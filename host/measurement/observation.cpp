@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "input_error.hpp"
+#include "linalg/decompositions.hpp"
 #include "measurement/reflectors.hpp"
 
 namespace flexcomp::host {
@@ -106,7 +106,7 @@ void observe_reflectors(const MeasuredData& data, const Robot& robot, std::vecto
     o.p_m = fit.pose.position;
     o.R = fit.pose.rotation;
     const Matrix6d information = fit_information(fit.pose, shape, m.position_sigma_m);
-    o.whitening = information.llt().matrixU();
+    o.whitening = Llt(information).lower().transpose();
     o.misfit_chi2 = fit.squares_m2 / (m.position_sigma_m * m.position_sigma_m);
     o.misfit_dof = 3 * data.reflectors - 6;
     if (misfit_probability(o.misfit_chi2, o.misfit_dof) < improbable) slipped.push_back(k);

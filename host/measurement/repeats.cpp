@@ -76,7 +76,7 @@ Matrix6d declared_covariance(const Observation& row) {
   Matrix6d covariance = Matrix6d::Zero();
   const Eigen::Index n = row.has_orientation ? 6 : 3;
   const Eigen::MatrixXd w = row.whitening.topLeftCorner(n, n);
-  covariance.topLeftCorner(n, n) = (w.transpose() * w).inverse();
+  covariance.topLeftCorner(n, n) = inverse(w.transpose() * w);
   return covariance;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Frames of the measurement: F (robot base in the instrument) and E (measured point in the tool), Eq. (M2) of docs/model.md.
+/// Frames of the measurement: F (robot base in the instrument) and E (measured point in the tool), Eq. (M1) of docs/model.md.
 #ifndef FLEXCOMP_HOST_MODEL_FRAMES_HPP
 #define FLEXCOMP_HOST_MODEL_FRAMES_HPP
 

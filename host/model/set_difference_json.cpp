@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "model/set_difference_json.hpp"
 
-#include <nlohmann/json.hpp>
-
+#include "json.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 
-nlohmann::ordered_json to_json(const SetDifference& d) {
-  nlohmann::ordered_json result;
+Json to_json(const SetDifference& d) {
+  Json result;
   result["unchanged"] = d.unchanged;
   result["tool"] = {{"mean_mm", d.at_tool.mean_m * 1e3},
                     {"largest_mm", d.at_tool.largest_m * 1e3},
                     {"largest_deg", degrees(d.at_tool.largest_rad)},
                     {"poses", d.poses}};
-  result["parameters"] = nlohmann::ordered_json::array();
+  result["parameters"] = Json::array();
   for (const ParameterChange& c : d.changes) {
     result["parameters"].push_back({{"name", c.name},
                                     {"old", c.before / c.unit.si_per_file_unit()},

@@ -4,14 +4,13 @@
 #ifndef FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_JSON_HPP
 #define FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_JSON_HPP
 
-#include <nlohmann/json_fwd.hpp>
-
+#include "json.hpp"
 #include "model/set_difference.hpp"
 
 namespace flexcomp::host {
 
 /// {"unchanged", "tool": {…}, "parameters": […]}, in the units of files.
-nlohmann::ordered_json to_json(const SetDifference& d);
+Json to_json(const SetDifference& d);
 
 }  // namespace flexcomp::host
 

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "linalg/blas.hpp"
 #include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
@@ -184,8 +185,7 @@ Eigen::MatrixXd Information::gradient(const Criterion& criterion) const {
 
 Eigen::MatrixXd sum_of_squares(const std::vector<Block>& blocks, Eigen::Index unknowns) {
   Eigen::MatrixXd m = Eigen::MatrixXd::Zero(unknowns, unknowns);
-  for (const Block& h : blocks) m.selfadjointView<Eigen::Lower>().rankUpdate(h);
-  m.triangularView<Eigen::StrictlyUpper>() = m.transpose();
+  for (const Block& h : blocks) m.noalias() += h * h.transpose();
   return m;
 }
 
@@ -208,8 +208,8 @@ ExactFigures exact_figures(const std::vector<Block>& blocks, Eigen::Index nuisan
     if (!(std::abs(r(c, c)) > 1e-10 * h.col(c).norm())) return out;
   }
   out.full_rank = true;
-  const Eigen::MatrixXd inverse =
-      r.bottomRightCorner(p, p).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(p, p));
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(p, p);
+  solve_lower_transposed(r.bottomRightCorner(p, p).transpose(), inverse);
   out.sigma = inverse.rowwise().norm();
   out.figures.trace = out.sigma.squaredNorm();
   out.figures.log_det = 2 * r.diagonal().tail(p).cwiseAbs().array().log().sum();

@@ -55,7 +55,6 @@ class Information {
   const Figures& figures() const { return figures_; }
   const Eigen::MatrixXd& matrix() const { return m_; }  ///< with the prior
   const Eigen::MatrixXd& inverse() const { return v_; }
-  const Eigen::MatrixXd& nuisance_inverse() const { return v_nuisance_; }
   Eigen::Index unknowns() const { return m_.rows(); }
   Eigen::Index nuisance() const { return v_nuisance_.rows(); }
   Eigen::Index parameters() const { return unknowns() - nuisance(); }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <set>
 
+#include "json.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -114,12 +116,12 @@ void DetmaxSearch::step() {
   replace_best(set, problem_.log_fitness(set));
 }
 
-void DetmaxSearch::save_own(nlohmann::json& state) const {
+void DetmaxSearch::save_own(Json& state) const {
   state["restart"] = next_;
   if (next_ > 0) state["least"] = least_;
 }
 
-void DetmaxSearch::load_own(const nlohmann::json& state) {
+void DetmaxSearch::load_own(const Json& state) {
   next_ = state.at("restart").get<std::uint64_t>();
   if (state.contains("least")) least_ = state.at("least").get<double>();
 }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "json.hpp"
 #include "planning/exchange.hpp"
 #include "planning/search.hpp"
 
@@ -32,8 +33,8 @@ class DetmaxSearch : public Search {
   }
 
  protected:
-  void save_own(nlohmann::json& state) const override;
-  void load_own(const nlohmann::json& state) override;
+  void save_own(Json& state) const override;
+  void load_own(const Json& state) override;
 
  private:
   DetmaxOptions options_;

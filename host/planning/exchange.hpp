@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "json.hpp"
 #include "planning/search.hpp"
 
 namespace flexcomp::host {
@@ -54,8 +55,8 @@ class ExchangeSearch : public Search {
   }
 
  protected:
-  void save_own(nlohmann::json& state) const override { state["restart"] = next_; }
-  void load_own(const nlohmann::json& state) override { next_ = state.at("restart").get<std::uint64_t>(); }
+  void save_own(Json& state) const override { state["restart"] = next_; }
+  void load_own(const Json& state) override { next_ = state.at("restart").get<std::uint64_t>(); }
 
  private:
   ExchangeOptions options_;

@@ -2,15 +2,13 @@
 #include "planning/plan_json.hpp"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "json.hpp"
 #include "named_values.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json value_json(const CriterionValue& v) {
   return {{"criterion", v.criterion}, {"o1", v.o1}, {"omin_expected", v.omin_expected}};

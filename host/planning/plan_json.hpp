@@ -4,14 +4,13 @@
 #ifndef FLEXCOMP_HOST_PLANNING_PLAN_JSON_HPP
 #define FLEXCOMP_HOST_PLANNING_PLAN_JSON_HPP
 
-#include <nlohmann/json_fwd.hpp>
-
+#include "json.hpp"
 #include "planning/plan_result.hpp"
 
 namespace flexcomp::host {
 
 /// \param output  the plan's file
-nlohmann::ordered_json to_json(const PlanTask& task, const PlanResult& result, const std::string& output);
+Json to_json(const PlanTask& task, const PlanResult& result, const std::string& output);
 
 }  // namespace flexcomp::host
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "planning/pose_information.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <random>
 
@@ -9,6 +8,7 @@
 #include "flexcomp/identification.hpp"
 #include "identification/identifiability.hpp"
 #include "identification/residuals.hpp"
+#include "linalg/decompositions.hpp"
 #include "measurement/reflectors.hpp"
 
 namespace flexcomp::host {
@@ -52,7 +52,7 @@ Instrument Instrument::position(double sigma_m) {
 Instrument Instrument::reflectors(const std::vector<Eigen::Vector3d>& template_m, double sigma_m) {
   Instrument i;
   i.isotropic_ = false;
-  i.whitening_ = fit_information(Pose<double>(), template_m, sigma_m).llt().matrixU();
+  i.whitening_ = Llt(fit_information(Pose<double>(), template_m, sigma_m)).lower().transpose();
   return i;
 }
 

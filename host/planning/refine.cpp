@@ -6,6 +6,7 @@
 #include <deque>
 #include <limits>
 
+#include "json.hpp"
 #include "planning/exchange.hpp"
 
 namespace flexcomp::host {
@@ -198,13 +199,13 @@ void RefineSearch::step() {
   }
 }
 
-void RefineSearch::save_own(nlohmann::json& state) const {
+void RefineSearch::save_own(Json& state) const {
   state["step"] = next_;
   state["now"] = to_json(current_);
   state["now_log"] = current_log_;
 }
 
-void RefineSearch::load_own(const nlohmann::json& state) {
+void RefineSearch::load_own(const Json& state) {
   next_ = state.at("step").get<std::uint64_t>();
   current_.clear();
   if (!state.at("now").empty()) current_ = pose_set_of(state.at("now"), problem_);

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "json.hpp"
 #include "planning/search.hpp"
 
 namespace flexcomp::host {
@@ -34,8 +35,8 @@ class RefineSearch : public Search {
   }
 
  protected:
-  void save_own(nlohmann::json& state) const override;
-  void load_own(const nlohmann::json& state) override;
+  void save_own(Json& state) const override;
+  void load_own(const Json& state) override;
 
  private:
   RefineOptions options_;

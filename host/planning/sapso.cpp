@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "json.hpp"
+
 namespace flexcomp::host {
 
 double adaptive_inertia(double f, double f_min, double f_avg, double w_min, double w_max) {
@@ -97,10 +99,10 @@ void SapsoSearch::step() {
   offer(swarm_[leader_].best, std::log(swarm_[leader_].best_value));
 }
 
-void SapsoSearch::save_own(nlohmann::json& state) const {
+void SapsoSearch::save_own(Json& state) const {
   state["step"] = next_;
   state["leader"] = leader_;
-  nlohmann::json& swarm = state["swarm"] = nlohmann::json::array();
+  Json& swarm = state["swarm"] = Json::array();
   for (const Particle& p : swarm_) {
     swarm.push_back({{"at", to_json(p.at)},
                      {"speed", p.speed},
@@ -110,11 +112,11 @@ void SapsoSearch::save_own(nlohmann::json& state) const {
   }
 }
 
-void SapsoSearch::load_own(const nlohmann::json& state) {
+void SapsoSearch::load_own(const Json& state) {
   next_ = state.at("step").get<std::uint64_t>();
   leader_ = state.at("leader").get<std::size_t>();
   swarm_.clear();
-  for (const nlohmann::json& p : state.at("swarm")) {
+  for (const Json& p : state.at("swarm")) {
     swarm_.push_back({pose_set_of(p.at("at"), problem_), p.at("speed").get<std::vector<Joints>>(),
                       pose_set_of(p.at("best"), problem_), p.at("value").get<double>(),
                       p.at("best_value").get<double>()});

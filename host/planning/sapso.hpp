@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "json.hpp"
 #include "planning/search.hpp"
 
 namespace flexcomp::host {
@@ -41,8 +42,8 @@ class SapsoSearch : public Search {
   }
 
  protected:
-  void save_own(nlohmann::json& state) const override;
-  void load_own(const nlohmann::json& state) override;
+  void save_own(Json& state) const override;
+  void load_own(const Json& state) override;
 
  private:
   struct Particle {

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "json.hpp"
+
 namespace flexcomp::host {
 
 namespace {
@@ -97,15 +99,15 @@ void Search::replace_best(const PoseSet& set, double log_fitness) {
   history_.emplace_back(evaluations_, log_fitness);
 }
 
-nlohmann::json to_json(const PoseSet& set) {
-  nlohmann::json out = nlohmann::json::array();
+Json to_json(const PoseSet& set) {
+  Json out = Json::array();
   for (const PlannedPose& p : set) out.push_back({p.q_rad, p.payload});
   return out;
 }
 
-PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem) {
+PoseSet pose_set_of(const Json& json, const PlanProblem& problem) {
   PoseSet set;
-  for (const nlohmann::json& p : json) set.push_back({p.at(0).get<Joints>(), p.at(1).get<std::size_t>()});
+  for (const Json& p : json) set.push_back({p.at(0).get<Joints>(), p.at(1).get<std::size_t>()});
   if (set.size() != problem.poses) throw std::runtime_error("another number of poses");
   for (const PlannedPose& p : set) {
     if (p.payload >= problem.payloads.size()) throw std::runtime_error("a payload that is not there");
@@ -114,8 +116,8 @@ PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem) {
   return set;
 }
 
-nlohmann::json Search::save() const {
-  nlohmann::json state{{"evaluations", evaluations_}, {"history", history_}};
+Json Search::save() const {
+  Json state{{"evaluations", evaluations_}, {"history", history_}};
   if (!best_.empty()) {
     state["best"] = to_json(best_);
     state["log_fitness"] = best_log_;
@@ -124,7 +126,7 @@ nlohmann::json Search::save() const {
   return state;
 }
 
-void Search::load(const nlohmann::json& state) {
+void Search::load(const Json& state) {
   evaluations_ = state.at("evaluations").get<std::uint64_t>();
   history_ = state.at("history").get<std::vector<std::pair<std::uint64_t, double>>>();
   if (state.contains("best")) {

@@ -9,11 +9,11 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <utility>
 #include <vector>
 
+#include "json.hpp"
 #include "planning/criterion.hpp"
 #include "planning/pose_information.hpp"
 
@@ -80,13 +80,13 @@ class Search {
   const std::vector<std::pair<std::uint64_t, double>>& history() const { return history_; }
 
   /// Complete state: a search that loads it continues exactly as if it had not been interrupted.
-  nlohmann::json save() const;
-  /// \throws nlohmann::json::exception, std::runtime_error  where the state does not fit
-  void load(const nlohmann::json& state);
+  Json save() const;
+  /// \throws Json::exception, std::runtime_error  where the state does not fit
+  void load(const Json& state);
 
  protected:
-  virtual void save_own(nlohmann::json& state) const = 0;
-  virtual void load_own(const nlohmann::json& state) = 0;
+  virtual void save_own(Json& state) const = 0;
+  virtual void load_own(const Json& state) = 0;
   /// Replaces the best set where this one is better.
   bool offer(const PoseSet& set, double log_fitness);
   /// Replaces the best set: for a method with another objective.
@@ -102,9 +102,9 @@ class Search {
 };
 
 /// Joint positions, rad, and payload index of each pose.
-nlohmann::json to_json(const PoseSet& set);
-/// Inverse of to_json(). \throws nlohmann::json::exception, std::runtime_error  where it is no set of this problem
-PoseSet pose_set_of(const nlohmann::json& json, const PlanProblem& problem);
+Json to_json(const PoseSet& set);
+/// Inverse of to_json(). \throws Json::exception, std::runtime_error  where it is no set of this problem
+PoseSet pose_set_of(const Json& json, const PlanProblem& problem);
 
 }  // namespace flexcomp::host
 

@@ -9,6 +9,7 @@
 #include "files/write_file.hpp"
 #include "flexcomp/sha256.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 #include "named_values.hpp"
 
 namespace flexcomp::host {
@@ -43,7 +44,7 @@ SearchState::SearchState(const PlanTask& task)
             {"seed", task.settings.seed}} {}
 
 void SearchState::save(const std::string& path, const Search& search) const {
-  write_file(path, nlohmann::ordered_json{{"task", task_}, {"search", search.save()}}.dump() + "\n");
+  write_file(path, Json{{"task", task_}, {"search", search.save()}}.dump() + "\n");
 }
 
 void SearchState::load(const std::string& path, Search& search) const {
@@ -51,16 +52,16 @@ void SearchState::load(const std::string& path, Search& search) const {
     return InputError(path, 0, "", "a state of a search", e.what(), ErrorCode::search_state);
   };
   try {
-    const auto found = nlohmann::ordered_json::parse(read_file(path));
+    const auto found = Json::parse(read_file(path));
     for (const auto& [key, value] : task_.items()) {
-      const nlohmann::ordered_json& there = found.at("task").at(key);
+      const Json& there = found.at("task").at(key);
       if (there != value)
         throw InputError(path, 0, key, "the state of this very task: " + value.dump(), there.dump());
     }
-    search.load(nlohmann::json(found.at("search")));
+    search.load(found.at("search"));
   } catch (const InputError&) {
     throw;
-  } catch (const nlohmann::json::exception& e) {
+  } catch (const Json::exception& e) {
     throw no_state(e);
   } catch (const std::runtime_error& e) {
     throw no_state(e);

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "json.hpp"
 #include "planning/plan_task.hpp"
 
 namespace flexcomp::host {
@@ -20,7 +21,7 @@ class SearchState {
   void load(const std::string& path, Search& search) const;
 
  private:
-  nlohmann::ordered_json task_;
+  Json task_;
 };
 
 }  // namespace flexcomp::host

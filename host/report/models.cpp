@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "input_error.hpp"
+#include "linalg/blas.hpp"
 #include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
@@ -31,8 +32,9 @@ std::optional<std::vector<RowResidual>> left_out(const Identification& r, const 
   const Eigen::MatrixXd upper = upper_factor(weighted);
   if (!(upper.diagonal().cwiseAbs().minCoeff() > 0)) return std::nullopt;
   // Rows of this are orthonormal over all: H_ii = A_i A_i^T.
-  const Eigen::MatrixXd a =
-      upper.transpose().triangularView<Eigen::Lower>().solve(weighted.transpose()).transpose();
+  Eigen::MatrixXd a = weighted.transpose();
+  solve_lower(upper.transpose(), a);
+  a.transposeInPlace();
   std::vector<RowResidual> out(rows.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const Eigen::Index size = rows[k].has_orientation ? 6 : 3;

@@ -46,7 +46,7 @@ std::string summary_table(const PagePoses& set, const ErrorPairs& position, cons
              escaped(set.before), escaped(set.after));
 }
 
-/// "2 of 60 poses lie far from the rest …: 4, 17."
+/// "2 of 60 poses are outliers …: 4, 17."
 std::string outliers_paragraph(const std::vector<std::size_t>& outliers, std::size_t poses) {
   if (outliers.empty()) return "";
   constexpr std::size_t most_named = 12;
@@ -55,8 +55,8 @@ std::string outliers_paragraph(const std::vector<std::size_t>& outliers, std::si
   for (std::size_t k = 0; k < std::min(count, most_named); ++k)
     which += fmt::format("{}{}", k > 0 ? ", " : "", outliers[k] + 1);
   return paragraph(
-      fmt::format("{} of {} poses {} not count in full: {}{}.", count, poses,
-                  count == 1 ? "lies far from the rest and does" : "lie far from the rest and do", which,
+      fmt::format("{} of {} poses {}: {}{}.", count, poses,
+                  count == 1 ? "is an outlier and down-weighted" : "are outliers and down-weighted", which,
                   count > most_named ? ", …" : ""));
 }
 

@@ -127,7 +127,7 @@ std::string identifiability_sections(const Page& page) {
     for (const PageConfounded& c : page.confounded) {
       items +=
           fmt::format("<li><code>{}</code>: {}</li>\n", escaped(c.parameter),
-                      c.with.empty() ? "has no effect in these data" : "carried by " + code_list(c.with));
+                      c.with.empty() ? "has no effect in these data" : "absorbed by " + code_list(c.with));
     }
     out += section(
         "Cannot be told apart",

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "files/csv.hpp"
 #include "files/read_file.hpp"
 #include "input_error.hpp"
+#include "json.hpp"
 #include "model/robot.hpp"
 #include "report/pose_errors.hpp"
 #include "units.hpp"
@@ -84,7 +84,7 @@ PagePoses errors_before_and_after(const std::string& title, const std::string& b
 
 PageResult stored_result(const std::string& title, const std::string& path) {
   try {
-    const auto j = nlohmann::json::parse(read_file(path));
+    const auto j = Json::parse(read_file(path));
     PageResult r;
     r.title = title;
     r.poses = j.at("poses");
@@ -95,7 +95,7 @@ PageResult stored_result(const std::string& title, const std::string& path) {
     r.remark = fmt::format("before: nominal arm{}; chi-square per degree of freedom {:.3g}",
                            fitted ? ", frames fitted" : "", j.at("chi2_per_dof").get<double>());
     return r;
-  } catch (const nlohmann::json::exception& e) {
+  } catch (const Json::exception& e) {
     throw InputError(path, 0, "", "a result", e.what(), ErrorCode::no_result_file);
   }
 }

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "json.hpp"
 #include "report/axis.hpp"
 #include "report/plots.hpp"
 #include "report/pose_errors.hpp"
@@ -25,8 +25,6 @@ namespace {
 constexpr double joint_unit_rad = radians(1e-3);
 constexpr double error_unit_mm = 1e-5;
 constexpr double angle_unit_deg = 1e-6;
-
-using Json = nlohmann::ordered_json;
 
 /// What is drawn needs no more digits than these.
 double short_number(double v) {

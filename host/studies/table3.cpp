@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "flexcomp/forward.hpp"
+#include "linalg/decompositions.hpp"
 #include "studies/calibrations.hpp"
 #include "studies/planned.hpp"
 #include "studies/study.hpp"
@@ -23,8 +24,8 @@ constexpr std::size_t other_poses = 30;
 
 /// Expectation of |x| of a normal x with this covariance, by 4,000 draws with a fixed seed.
 double mean_length(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
-  const Eigen::Array3d sigma = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const SymmetricEigen eigen = symmetric_eigen(covariance);
+  const Eigen::Array3d sigma = eigen.values.cwiseMax(0).cwiseSqrt();
   constexpr int draws = 4000;
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;

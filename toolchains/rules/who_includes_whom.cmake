@@ -23,7 +23,7 @@ set(modules model linalg measurement kinematics files identification planning di
 set(model_may)
 set(linalg_may)
 set(measurement_may model linalg kinematics)
-set(kinematics_may model)
+set(kinematics_may model linalg)
 set(files_may model measurement)
 set(identification_may model measurement linalg)
 set(planning_may model measurement linalg identification files)

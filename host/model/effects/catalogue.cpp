@@ -119,7 +119,7 @@ std::vector<EffectDescriptor> make_effects() {
       .needs = Needs::load,
       .place = theta,
       .follows = the_load,
-      .sentence = [](const EffectId& id) { return joint_name(id) + " yields to the load"; },
+      .sentence = [](const EffectId& id) { return joint_name(id) + " deflects under the load"; },
       .physics = "The joint is a linear torsional spring: it turns in proportion to the torque of payload "
                  "and external "
                  "force about its axis (M11, M12). The coefficient is a compliance, 1/K. Usual: 1e-8 to 2e-3 "
@@ -141,7 +141,7 @@ std::vector<EffectDescriptor> make_effects() {
       .follows = the_load,
       .sentence =
           [](const EffectId& id) {
-            return joint_name(id) + " yields to the load otherwise than in proportion";
+            return joint_name(id) + " deflects under the load otherwise than in proportion";
           },
       .physics = "Gears stiffen with torque: a cubic part of the joint's deflection beside the linear one "
                  "(M11). Negative "

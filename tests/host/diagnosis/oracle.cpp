@@ -159,7 +159,7 @@ struct Group {
   std::vector<std::size_t> parameters;  ///< of the oracle's fit
 };
 
-/// A model with its fit: every row counts in full.
+/// A model with its fit: every row has weight 1.
 struct Fitted {
   Estimate estimate;
   Unknowns unknowns;

@@ -145,7 +145,7 @@ test('errors are drawn in the frame of the arm, wherever the instrument stands',
   }
   // What carries is on the page, with its uncertainty; and "before" says which frames it had.
   const text = readFileSync(at('place1.html'), 'utf8');
-  const carriers = [...text.matchAll(/carried by (.*?)<\/li>/g)].flatMap((m) => [...m[1].matchAll(/<code>(.*?)<\/code>/g)].map((c) => c[1]));
+  const carriers = [...text.matchAll(/absorbed by (.*?)<\/li>/g)].flatMap((m) => [...m[1].matchAll(/<code>(.*?)<\/code>/g)].map((c) => c[1]));
   assert.ok(carriers.some((name) => name.startsWith('frame_')), `${carriers}`);
   for (const name of carriers) assert.match(text, new RegExp(`<th scope="row">${name.replace(/[[\].]/g, '\\$&')}</th><td>-?[\\d.e-]+</td><td>[\\d.e-]+</td>`));
   assert.match(text, /before: nominal model, frames fitted/);

@@ -283,7 +283,7 @@ TEST(Report, ShowsTheNumbersThatWerePutIn) {
       HasSubstr(
           "<tr class=\"pale\"><th scope=\"row\">joint_compliance[joint=2].rad_per_nm</th><td>1.5e-5</td>"
           "<td>1.3e-5</td><td class=\"text\">rad/(N·m)</td>"));
-  EXPECT_THAT(text, HasSubstr("<code>base.z_mm</code>: carried by <code>link1.d_mm</code>"));
+  EXPECT_THAT(text, HasSubstr("<code>base.z_mm</code>: absorbed by <code>link1.d_mm</code>"));
   // The one that carries says so in the table too.
   page.parameters.push_back({"link1.d_mm", 0.4, 0.01});
   EXPECT_THAT(html(page, false),
@@ -645,7 +645,7 @@ TEST(Report, WhatLiesFarFromTheRestIsMarked) {
   const std::string text = html(page, false);
   EXPECT_EQ(occurrences(text, "class=\"apart\""), 8U) << "in order, and against six joints and the order";
   EXPECT_THAT(text, HasSubstr("A diamond: it lies far from the rest."));
-  EXPECT_THAT(text, HasSubstr("1 of 40 poses lies far from the rest and does not count in full: 4."));
+  EXPECT_THAT(text, HasSubstr("1 of 40 poses is an outlier and down-weighted: 4."));
 }
 
 TEST(Report, LinksNeverLeadIntoTheNetwork) {

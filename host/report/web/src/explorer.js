@@ -198,7 +198,7 @@ export class Explorer {
       set.line.length > 0 ? ` (line ${set.line[pose]})` : '',
       `: ${covariate.name} ${shown(covariate.values[pose])}; before ${this.text(this.values.before[pose])}, `
         + `after ${this.text(this.values.after[pose])}`,
-      set.outlier.has(pose) ? '; lies far from the rest and does not count in full' : '');
+      set.outlier.has(pose) ? '; outlier, down-weighted' : '');
   }
 
   key(event) {
