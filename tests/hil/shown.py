@@ -47,8 +47,9 @@ def run(text, least, seconds=200):
             print("FAILED: did not end:", command, rest, sep="\n")
             return True, printed
         rest = rest[piece.end():]
-        # Lines in their order; "…" stands for any number of lines, and seconds at the end of a line are not repeated.
-        have = iter(piece[1].split("\n"))
+        # Lines in their order; "…" stands for any number of lines, and seconds at the end of a line are not repeated. Where a
+        # progress bar was drawn, on a console and a busy machine, what erases it stands before the next line.
+        have = iter(piece[1].replace("\033[K", "").split("\n"))
         missing = next((w for w in lines if w.strip() not in ("", "…") and not any(h.rstrip().startswith(w.rstrip()) for h in have)), None)
         # A page that shows a status says so by its next command.
         status_shown = k + 1 < len(shown) and shown[k + 1][0] == "echo $?"
