@@ -15,7 +15,7 @@ namespace flexcomp::host {
 std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& answers) {
   std::vector<std::string> cells;
   for (std::size_t j = 0; j < joint_count; ++j) cells.push_back(fmt::format("q{}_deg", j + 1));
-  cells.insert(cells.end(), {"residual_mm", "residual_deg", "status"});
+  cells.insert(cells.end(), answer_columns.begin(), answer_columns.end());
   for (const std::string& extra : targets.extra) cells.push_back(csv_cell(extra));
   std::string text = fmt::format("{}\n", fmt::join(cells, ","));
   for (std::size_t k = 0; k < answers.size(); ++k) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "commands/commands.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -21,13 +22,24 @@ namespace {
 
 int status(ExitStatus s) { return static_cast<int>(s); }
 
+/// A stream that the caller has closed is opened to nowhere: the next file would get its number, and messages in it.
+void open_standard_streams() {
+  for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; ++fd) {
+    if (::fcntl(fd, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) == -1) return;
+  }
+}
+
+// Messages are written by fputs, which does not throw: where standard error is full, the exit status still says it.
+
 void give_hint(const std::string& text) {
-  if (!text.empty()) fmt::print(stderr, "{} {}\n", painted("hint:", Colour::note, STDERR_FILENO), text);
+  if (!text.empty())
+    std::fputs(fmt::format("{} {}\n", painted("hint:", Colour::note, STDERR_FILENO), text).c_str(), stderr);
 }
 
 int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
   std::fflush(stdout);  // in one file the message stands behind what it is about
-  fmt::print(stderr, "{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), message(e));
+  std::fputs(fmt::format("{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), message(e)).c_str(),
+             stderr);
   const std::vector<CLI::App*> commands = app.get_subcommands();
   give_hint(hint(e, commands.empty() ? "" : commands.front()->get_name()));
   return status(s);
@@ -35,7 +47,11 @@ int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
 
 /// Asking for help or the version ends here too, with 0.
 int give_up(const CLI::ParseError& e, const CLI::App& app, const std::vector<std::string>& arguments) {
-  if (app.exit(e) == 0) return status(ExitStatus::done);
+  if (app.get_subcommands().empty() && !arguments.empty() && !arguments.front().starts_with('-')) {
+    std::fputs(fmt::format("flexcomp: \"{}\" is no command\n", arguments.front()).c_str(), stderr);
+  } else if (app.exit(e) == 0) {
+    return status(ExitStatus::done);
+  }
   give_hint(usage_hint(app, arguments));
   return status(ExitStatus::usage);
 }
@@ -43,6 +59,7 @@ int give_up(const CLI::ParseError& e, const CLI::App& app, const std::vector<std
 }  // namespace
 
 int run(int argc, char** argv) {
+  open_standard_streams();
   CLI::App app{
       "Rigid-flexible calibration of robot arms: from measured points to corrected joint commands in the "
       "controller.\n"

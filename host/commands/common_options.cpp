@@ -29,7 +29,7 @@ void CommonOptions::say(const std::string& text) const {
 void CommonOptions::warn(const std::vector<std::string>& warnings) const {
   std::fflush(stdout);  // in one file a warning stands where it was said
   for (const std::string& w : warnings)
-    fmt::print(stderr, "{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w);
+    std::fputs(fmt::format("{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w).c_str(), stderr);
 }
 
 void CommonOptions::write_json(const Json& result) const {

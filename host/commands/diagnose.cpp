@@ -159,7 +159,7 @@ void add_diagnose(CLI::App& app) {
       "others.csv -o cal2.yaml\n"
       "Every verdict is exit status 0. Exit status 5: the files were written, but the error did not shrink "
       "or "
-      "chi-square lies outside its 99.9 % interval.");
+      "chi-square says that the noise is smaller than was declared.");
   command->callback([options] { options->run(); });
 }
 

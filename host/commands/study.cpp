@@ -143,14 +143,14 @@ void StudyCommand::run() const {
   const bool watched = !common.quiet && ::isatty(STDERR_FILENO) == 1;
   if (watched) {
     options.progress = [](const std::string& what, double done) {
-      fmt::print(stderr, "\r\033[K{:3.0f} %  {}", 100 * done, what);
+      std::fputs(fmt::format("\r\033[K{:3.0f} %  {}", 100 * done, what).c_str(), stderr);
     };
   }
   const auto& all = studies();
   const auto entry =
       std::find_if(all.begin(), all.end(), [&](const StudyEntry& e) { return name == e.name; });
   const Study study = entry->run(options);
-  if (watched) fmt::print(stderr, "\r\033[K");
+  if (watched) std::fputs("\r\033[K", stderr);
   common.say(fmt::format("{}\n  {}\n\n{}", study.title, study.quantity, text_of(table_of(study, ""))));
   for (const std::string& note : study.notes) common.say("  " + note);
   common.write_json(json_of(study, options));

@@ -229,6 +229,16 @@ class Krl : public ProgramText {
       throw error(at, name, joints != 0 ? "all of A1 … A6" : "all of X, Y, Z, A, B, C",
                   fmt::format("{} of them: the others are where the program left them", needed));
     }
+    for (const auto& [part, value] : parts) {
+      const bool own = std::find(axes.begin(), axes.end(), part) != axes.end();
+      const bool of_pose =
+          std::find(pose.begin(), pose.end(), part) != pose.end() || part == "s" || part == "t";
+      const bool external = part.size() == 2 && part[0] == 'e' && part[1] >= '1' && part[1] <= '6';
+      if (external || (joints != 0 ? own : of_pose)) continue;
+      throw error(at, name,
+                  joints != 0 ? "A1 … A6 and E1 … E6 alone" : "X, Y, Z, A, B, C, S, T and E1 … E6 alone",
+                  fmt::format("\"{}\" (a decimal comma?)", part.empty() ? plain(value) : part));
+    }
     ProgramTarget found;
     found.line = line(at);
     found.name = name;

@@ -321,7 +321,11 @@ void read_head(const YamlField& root, const Robot& robot, Calibration& c) {
     for (Eigen::Index r = 0; r < n; ++r) {
       const YamlField& row = rows[static_cast<std::size_t>(r)];
       row.require_keys({"parameter", "row"});
-      covariance.parameters.push_back(row.at("parameter").text());
+      const std::string parameter = row.at("parameter").text();
+      if (std::find(covariance.parameters.begin(), covariance.parameters.end(), parameter) !=
+          covariance.parameters.end())
+        throw row.at("parameter").error("each parameter once", parameter + " twice");
+      covariance.parameters.push_back(parameter);
       const std::vector<YamlField> values = row.at("row").items();
       if (static_cast<Eigen::Index>(values.size()) != r + 1)
         throw row.error(fmt::format("{} numbers: a lower triangle", r + 1), fmt::format("{}", values.size()));

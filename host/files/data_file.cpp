@@ -493,6 +493,11 @@ TargetsFile load_targets(const std::string& path, const Robot& robot, const Load
     joints = reader.require_joints(joint_name, choice);
   }
   const std::vector<std::size_t> extra = reader.unknown(targets.extra, targets.warnings);
+  for (const std::string& name : targets.extra) {
+    if (std::find(answer_columns.begin(), answer_columns.end(), name) != answer_columns.end())
+      throw InputError(path, 1, name, "targets",
+                       "a column of the answers to targets: this file was written by compensate or probe");
+  }
   const CsvTable& table = reader.table();
   if (table.rows.empty()) throw InputError(path, 2, "", "at least one row", "none");
   reader.refuse_radians(joints, options);

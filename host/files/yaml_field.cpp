@@ -41,7 +41,10 @@ YamlField YamlField::load(const std::string& path) { return parse(read_file(path
 
 YamlField YamlField::parse(const std::string& text, const std::string& name) {
   try {
-    YamlField root(YAML::Load(text), name, "", 1);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1)
+      throw InputError(name, line_of(documents[1].Mark()), "", "one YAML document", "another one behind ---");
+    YamlField root(documents.empty() ? YAML::Node() : documents.front(), name, "", 1);
     if (!root.node_.IsMap()) throw InputError(name, 0, "", "a mapping (key: value)", describe(root.node_));
     return root;
   } catch (const YAML::Exception& e) {

@@ -26,6 +26,9 @@ struct Target {
   std::vector<std::string> extra;
 };
 
+/// What a file of answers has beside its joints and the columns of its targets.
+inline constexpr std::array<const char*, 3> answer_columns{"residual_mm", "residual_deg", "status"};
+
 struct TargetsFile {
   std::string path;
   bool poses = false;  ///< false: joint commands

@@ -272,5 +272,15 @@ for command, never in (("flexcomp import tracker.txt --joints log.csv --joint-co
 for wrong, right in (("tx60.yaml", "tx60l.yaml"), ("tx60l.yml", "tx60l.yaml"), ("wron.yaml", "worn.yaml")):
     code, said, warned = run("flexcomp identify --robot %s --data measured.csv -o x.yaml" % wrong)
     if code != 3 or "there is " + right not in warned: fail(wrong, code, warned)
+for wrong in ("frob", "plann --robot tx60l.yaml"):
+    code, said, warned = run("flexcomp " + wrong)
+    if code != 2 or '"%s" is no command' % wrong.split()[0] not in warned: fail(wrong, code, warned)
+# Where a message cannot be written the exit status says it alone, and no output file takes the place of the stream.
+for command, status in (("flexcomp identify --robot nix.yaml --data measured.csv -o x.yaml", 3), ("flexcomp status --of foo", 2),
+                        ("flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data slipped.csv --json closed.json", 5)):
+    for stream in ("2>/dev/full", "2>&-"):
+        code, said, warned = run(command + " " + stream)
+        if code != status: fail(command, stream, code)
+json.load(open("closed.json"))
 print(failures, "failures")
 sys.exit(failures != 0)

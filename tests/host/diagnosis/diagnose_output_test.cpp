@@ -238,8 +238,15 @@ TEST(DiagnosisWords, NextStepsFollowTheVerdict) {
   // A place that scatters has no term; a smooth function has.
   d.verdict = Verdict::unnamed;
   EXPECT_THAT(text(""), Not(HasSubstr("--allow-unnamed")));
+  Diagnosis nothing = d;
   d.after.terms.terms.back().effect = Effect::unnamed;
   EXPECT_THAT(text(""), HasSubstr("--allow-unnamed"));
+  // Where nothing was added and the gap stays, the data are looked at before anything is pushed.
+  nothing.effects.clear();
+  std::swap(d, nothing);
+  EXPECT_THAT(text(""), HasSubstr("before anything is pushed"));
+  EXPECT_THAT(text(""), Not(HasSubstr("--to BUS")));
+  std::swap(d, nothing);
   d.doubts = {"the error did not shrink"};
   EXPECT_THAT(text(""), HasSubstr("cal2.yaml is not to be pushed"));
   EXPECT_THAT(text(""), Not(HasSubstr("--to BUS")));

@@ -151,6 +151,15 @@ TEST(Krl, WhatIsBrokenIsRefused) {
   refuses(krl, home + "PTP {A1 0,A2 -80,A3 90,A4 F(1,2),A5 30,A6 1}\n", 2, "'F(1,2)'");
   refuses(krl, home + "PTP {A1 0,A1 1,A2 -80,A3 90,A4 5,A5 30,A6 1}\n", 2, "once");
   refuses(krl, home + "SPL {X 1,Y 2}\n", 2, "all of X");
+  for (const char* t : {"A1 0,5,A2 -80,A3 90,A4 5,A5 30,A6 1", "A1 0,,A2 -80,A3 90,A4 5,A5 30,A6 1",
+                        "A1 0,B5,A2 -80,A3 90,A4 5,A5 30,A6 1", "A1 0,A2 -80,A3 90,A4 5,A5 30,A6 1,Q9 3",
+                        "A1 0,A2 -80,A3 90,A4 5,A5 30,A6 1,"})
+    refuses(krl, home + "PTP {" + t + "}\n", 2, "alone");
+  refuses(krl, home + "LIN {X 500,5,Y 50,Z 600,A 10,B 80,C 5}\n", 2, "alone");
+  EXPECT_THAT(
+      lines(krl(
+          "PTP {A1 0,A2 -80,A3 90,A4 5,A5 30,A6 1,E1 0,E6 2}\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 3,E1 0}\n")),
+      ElementsAre(1U, 2U));
   refuses(krl, home + "PTP " + std::string(300000, '{') + "\n", 2, "at most");
   for (const char* t : {"'B2'", "'B'", "'C1'", "B1", "'B1111111111111'", "-1", "1.5", "'H1000'", "'B1"})
     refuses(krl, fmt::format("PTP {{X 1,Y 2,Z 3,A 4,B 5,C 6,T {}}}\n", t), 1, "T");

@@ -94,6 +94,16 @@ void expect_identical(const TermSet& a, const TermSet& b) {
   ASSERT_EQ(a.tables.size(), b.tables.size());
 }
 
+TEST(CalibrationFile, OneDocumentAndEachParameterOfTheCovarianceOnce) {
+  const std::string factor =
+      "covariance_factor:\n  - {parameter: link1.d_mm, row: [1.0e-6]}\n  - {parameter: link1.theta_deg, row: "
+      "[0, 1.0e-6]}\n";
+  EXPECT_TRUE(load("robot: staubli-tx60l\n" + factor).covariance.has_value());
+  refused("robot: staubli-tx60l\n" + replaced(factor, "link1.theta_deg", "link1.d_mm"), 4,
+          "covariance_factor[2].parameter", {"each parameter once"});
+  refused("robot: staubli-tx60l\n---\nrobot: another\n", 3, "", {"one YAML document"});
+}
+
 TEST(CalibrationFile, ReadsEveryKeyOfTheCatalogue) {
   const Calibration c = load(full);
   EXPECT_EQ(c.robot, "staubli-tx60l");

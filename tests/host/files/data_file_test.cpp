@@ -273,6 +273,7 @@ TEST(Targets, JointsOrPosesWithSeeds) {
   EXPECT_EQ(p.rows[0].position_m.z(), 0.003);
   expect_refused([&] { targets(pose + "\n1,2,3,1,0,0,0\n"); }, 1, "seed1_deg", {"choose the branch"});
   expect_refused([&] { targets("x_mm,y_mm,z_mm\n1,2,3\n"); }, 1, "qw");
+  expect_refused([&] { targets(joints + ",status\n10,20,30,40,50,60,ok\n"); }, 1, "status", {"compensate"});
   expect_refused([&] { targets("a,b\n1,2\n"); }, 1, "q1_deg", {"targets"});
 }
 
