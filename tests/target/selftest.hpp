@@ -184,7 +184,8 @@ inline void evaluate(const Image& image, Results<S>& results) {
     const flexcomp::Pose<S> pose = flexcomp::forward(model, q, context, workspace);
     std::array<S, numbers_per_command>& out = results.numbers[k];
     for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) out[3 * static_cast<std::size_t>(r) + static_cast<std::size_t>(c)] = pose.rotation(r, c);
+      for (int c = 0; c < 3; ++c)
+        out[3 * static_cast<std::size_t>(r) + static_cast<std::size_t>(c)] = pose.rotation(r, c);
       out[9 + static_cast<std::size_t>(r)] = pose.position[r];
     }
     const flexcomp::Compensated<S, 6> corrected = flexcomp::compensate(model, q, context);
