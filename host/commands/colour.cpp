@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <string_view>
 
@@ -23,6 +24,10 @@ std::string painted(const std::string& text, Colour colour, int stream) {
   if (colour == Colour::bad) code = "\033[31m";
   if (colour == Colour::note) code = "\033[33m";
   return code + text + "\033[0m";
+}
+
+void print_message(const std::string& label, Colour colour, const std::string& text) {
+  std::fputs((painted(label, colour, STDERR_FILENO) + " " + text + "\n").c_str(), stderr);
 }
 
 }  // namespace flexcomp::host

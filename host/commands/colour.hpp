@@ -18,6 +18,9 @@ bool coloured(int stream);
 /// where they are.
 std::string painted(const std::string& text, Colour colour, int stream);
 
+/// A line "label text" on standard error. Never throws: where that is full, the exit status still says it.
+void print_message(const std::string& label, Colour colour, const std::string& text);
+
 }  // namespace flexcomp::host
 
 #endif

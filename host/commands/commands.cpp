@@ -29,17 +29,13 @@ void open_standard_streams() {
   }
 }
 
-// Messages are written by fputs, which does not throw: where standard error is full, the exit status still says it.
-
 void give_hint(const std::string& text) {
-  if (!text.empty())
-    std::fputs(fmt::format("{} {}\n", painted("hint:", Colour::note, STDERR_FILENO), text).c_str(), stderr);
+  if (!text.empty()) print_message("hint:", Colour::note, text);
 }
 
 int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
   std::fflush(stdout);  // in one file the message stands behind what it is about
-  std::fputs(fmt::format("{} {}\n", painted("flexcomp:", Colour::bad, STDERR_FILENO), message(e)).c_str(),
-             stderr);
+  print_message("flexcomp:", Colour::bad, message(e));
   const std::vector<CLI::App*> commands = app.get_subcommands();
   give_hint(hint(e, commands.empty() ? "" : commands.front()->get_name()));
   return status(s);
@@ -48,7 +44,7 @@ int give_up(ExitStatus s, const std::exception& e, const CLI::App& app) {
 /// Asking for help or the version ends here too, with 0.
 int give_up(const CLI::ParseError& e, const CLI::App& app, const std::vector<std::string>& arguments) {
   if (app.get_subcommands().empty() && !arguments.empty() && !arguments.front().starts_with('-')) {
-    std::fputs(fmt::format("flexcomp: \"{}\" is no command\n", arguments.front()).c_str(), stderr);
+    print_message("flexcomp:", Colour::bad, fmt::format("\"{}\" is no command", arguments.front()));
   } else if (app.exit(e) == 0) {
     return status(ExitStatus::done);
   }

@@ -2,7 +2,6 @@
 #include "commands/common_options.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
 
@@ -28,8 +27,7 @@ void CommonOptions::say(const std::string& text) const {
 
 void CommonOptions::warn(const std::vector<std::string>& warnings) const {
   std::fflush(stdout);  // in one file a warning stands where it was said
-  for (const std::string& w : warnings)
-    std::fputs(fmt::format("{} {}\n", painted("warning:", Colour::note, STDERR_FILENO), w).c_str(), stderr);
+  for (const std::string& w : warnings) print_message("warning:", Colour::note, w);
 }
 
 void CommonOptions::write_json(const Json& result) const {

@@ -158,8 +158,7 @@ void add_diagnose(CLI::App& app) {
       "Example:\n  flexcomp diagnose --robot tx60l.yaml --calibration cal.yaml --data measured.csv --holdout "
       "others.csv -o cal2.yaml\n"
       "Every verdict is exit status 0. Exit status 5: the files were written, but the error did not shrink "
-      "or "
-      "chi-square says that the noise is smaller than was declared.");
+      "or chi-square says that the noise is smaller than was declared.");
   command->callback([options] { options->run(); });
 }
 

@@ -80,8 +80,7 @@ std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calib
   } else if (d.verdict == Verdict::unnamed && d.effects.empty()) {
     steps.push_back(
         "before anything is pushed: look for a wrong convention, unit or joint in the data, or noise that "
-        "was declared "
-        "too small; nothing was added to the model");
+        "was declared too small; nothing was added to the model");
   } else {
     steps.push_back(fmt::format("into the controller: flexcomp push --to BUS {}", calibration));
   }
