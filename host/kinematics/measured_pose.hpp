@@ -14,7 +14,7 @@
 namespace flexcomp::host {
 
 /// Measured point or frame in the frame of the instrument: F B A1 … A6 Tool T E, with T the translation of the measured
-/// point in Ftool by effects (reflector_slip).
+/// point in Ftool by effects.
 Pose<double> measured_pose(const HostModel& model, const Calibration& calibration,
                            const std::array<double, joint_count>& q_rad,
                            const Context<double, joint_count>& context);

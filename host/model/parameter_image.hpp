@@ -19,8 +19,8 @@ struct ImageOptions {
   bool allow_unnamed = false;  ///< push what was found but not understood
 };
 
-/// The parameter image of a calibration, bound to the robot. Left out: what belongs to the measurement (base_drift,
-/// readout_lag, reflector_slip), and the base where frames were fitted. Instances and tables are numbered in order of
+/// The parameter image of a calibration, bound to the robot. Left out: effects of the measurement
+/// (belongs_to_measurement()), and the base where frames were fitted. Instances and tables are numbered in order of
 /// appearance, so that image -> calibration file -> image is the identity on bytes.
 /// \throws InputError  unnamed effects (unless allowed), base or tool terms above 20 mm or 2 degrees, terms that the
 ///                     core refuses
