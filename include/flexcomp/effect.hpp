@@ -33,6 +33,7 @@ enum class Effect : std::uint8_t {
   payload_error = 15,        ///< mass and centre of mass
   reflector_slip = 16,       ///< shift of the measured point from a time on; never pushed
   unnamed = 17,              ///< grid that no other effect explains
+  reflector_drift = 18,      ///< motion of the measured point in time; never pushed
 };
 
 /// What physics allows for each coefficient of an effect, SI per unit of the basis.
@@ -47,7 +48,7 @@ struct EffectBounds {
 
 namespace detail {
 /// By number of the effect.
-inline constexpr std::array<EffectBounds, 18> effect_bounds_table{{
+inline constexpr std::array<EffectBounds, 19> effect_bounds_table{{
     {},                    // geometric
     {0},                   // joint_compliance
     {},                    // link_gravity
@@ -66,12 +67,14 @@ inline constexpr std::array<EffectBounds, 18> effect_bounds_table{{
     {-0.5, 0.5, 0, true},  // payload_error
     {},                    // reflector_slip
     {},                    // unnamed
+    {},                    // reflector_drift
 }};
 }  // namespace detail
 
 /// Of the measurement and not of the robot: never sent to a controller.
 constexpr bool belongs_to_measurement(Effect effect) {
-  return effect == Effect::base_drift || effect == Effect::readout_lag || effect == Effect::reflector_slip;
+  return effect == Effect::base_drift || effect == Effect::readout_lag || effect == Effect::reflector_slip ||
+         effect == Effect::reflector_drift;
 }
 
 /// Bounds of an effect; of a number that is not registered, none.

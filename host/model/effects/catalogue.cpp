@@ -580,6 +580,39 @@ std::vector<EffectDescriptor> make_effects() {
   });
 
   list.push_back({
+      .effect = Effect::reflector_drift,
+      .name = "reflector_drift",
+      .keys =
+          [](const EffectId& id, const Nominal&) {
+            Keys keys;
+            for (std::uint8_t s = slot::x; s <= slot::z; ++s) {
+              const Place place{body::point, s};
+              keys.push_back(
+                  key(slot_name(place) + "_mm_per_h", term(id, place, Basis::time), unit::mm_per_hour));
+            }
+            return keys;
+          },
+      .usual_size = [](Place) { return 1e-5 / 3600; },
+      .needs = Needs::time,
+      .place =
+          [](const EffectId&) {
+            return Place{body::point, slot::x};
+          },
+      .follows = the_time,
+      .sentence =
+          [](const EffectId&) {
+            return std::string("the measured point drifts in the tool's frame while time passes");
+          },
+      .physics =
+          "The reflector creeps in its nest, or its holder warms up: the measured point moves uniformly "
+          "in Ftool with `time_s`, id 10 of section 2, E of (M1). A fault of the measurement.",
+      .record = "times of the rows; some early poses once more at the end, in several orientations",
+      .confounded_with =
+          "`base_drift`, where all rows have nearly one orientation; `reflector_slip`, where rows are few",
+      .example = {.effect = Effect::reflector_drift},
+  });
+
+  list.push_back({
       .effect = Effect::unnamed,
       .name = "unnamed",
       .selectors = {Selector::place, Selector::grid},

@@ -98,6 +98,32 @@ TEST(Diagnosis, FindsWhatThePaperFound) {
   }
 }
 
+// The point creeps in the tool's frame. It is moved here in the measured rows, without a term of the catalogue.
+TEST(Diagnosis, NamesAReflectorThatCreeps) {
+  using namespace flexcomp::host;
+  const Eigen::Vector3d moved_m = 150e-6 * Eigen::Vector3d(2, -1, 2) / 3;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    hidden::Case c = hidden::draw(hidden::Row::none, seed);
+    const double begin_s = c.train.front().context.time_s;
+    const double session_s = c.train.back().context.time_s - begin_s;
+    for (Observation& row : c.train)
+      row.p_m += row.R * moved_m * ((row.context.time_s - begin_s) / session_s);
+    DiagnoseOptions options;
+    options.columns = c.columns;
+    const Diagnosis d = diagnose(c.robot, c.train, c.what, options);
+    SCOPED_TRACE(c.arm_name + ", seed " + std::to_string(seed));
+    ASSERT_EQ(d.effects.size(), 1U);
+    const FoundEffect& found = d.effects.front();
+    EXPECT_EQ(name(found.id), "reflector_drift");
+    EXPECT_FALSE(found.pushed);
+    ASSERT_EQ(found.coefficients.size(), 3U);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const EffectCoefficient& rate = found.coefficients[k];
+      EXPECT_NEAR(rate.value, moved_m[static_cast<Eigen::Index>(k)] / session_s, 4 * rate.sigma) << rate.key;
+    }
+  }
+}
+
 TEST(Diagnosis, StandsRoughData) {
   const Tally t = run(hidden::Row::rough, 1, 6);
   EXPECT_LE(t.wrong, 1U) << t.report;
