@@ -7,22 +7,18 @@
 
 #include <random>
 
-#include "files/robot_file.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
 
-namespace {
+namespace data_files {
 
 using namespace flexcomp::host;
 using support::expect_refused;
 using support::replaced;
+using support::tx60l;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-const Robot& tx60l() {
-  static const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
-  return robot;
-}
 
 const std::string joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
 const std::string good = joints +
@@ -289,4 +285,4 @@ TEST(RealData, EverySetLoads) {
   EXPECT_EQ(load_data(folder + "/ur10-ipa/series_b.csv", ur10).rows.size(), 1495U);
 }
 
-}  // namespace
+}  // namespace data_files
