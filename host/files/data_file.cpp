@@ -187,9 +187,7 @@ class ColumnReader {
     std::array<double, 4> wxyz{};
     for (std::size_t k = 0; k < 4; ++k) wxyz[k] = number(row, columns[k], unit::si);
     if (const auto q = unit_quaternion(wxyz)) return *q;
-    throw InputError(
-        table_.path, row.line, "qw qx qy qz", "a quaternion of norm 1 (within 0.001)",
-        fmt::format("norm {:.6g}", Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm()));
+    throw InputError(table_.path, row.line, "qw qx qy qz", unit_quaternion_rule, norm_text(wxyz));
   }
 
   /// Refuses readings in radians under names in degrees: all below 7.
