@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
-#include <string>
 
 #include "kinematics/nominal_inverse.hpp"
 #include "support/arms.hpp"

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -94,10 +93,20 @@ double longest_mm(const Calibration& calibration, const Robot& robot) {
   return longest;
 }
 
-IdentifyOptions geometry() {
+/// The geometry of `drawing` by what is seen of `truth`.
+Identification identified(const Robot& drawing, const Robot& truth, const Views& how = {}) {
   IdentifyOptions options;
   options.model = ModelKind::geometric;
-  return options;
+  Identification r = identify(drawing, views(truth, how), "data", options);
+  EXPECT_TRUE(r.fit.converged);
+  return r;
+}
+
+/// Mean error (m) on views that were not identified from.
+double mean_on_others(const Robot& drawing, const Calibration& calibration, const Robot& truth,
+                      Views how = {}) {
+  how.seed = 99;
+  return validate(drawing, calibration, views(truth, how), "others").after.mean_m;
 }
 
 TEST(NearParallel, AnArmThatIsSlightlyOffParallelIsFoundWithSmallNumbers) {
@@ -108,12 +117,11 @@ TEST(NearParallel, AnArmThatIsSlightlyOffParallelIsFoundWithSmallNumbers) {
       for (const bool pose : {true, false}) {
         Views how;
         how.pose = pose;
-        const Identification r = identify(drawing, views(truth, how), "data", geometry());
-        EXPECT_TRUE(r.fit.converged);
+        const Identification r = identified(drawing, truth, how);
         EXPECT_TRUE(r.identifiability.missing.empty()) << r.identifiability.missing.front();
-        EXPECT_LT(longest_mm(r.calibration, drawing), 2) << file << " " << tilt_deg;
-        how.seed = 99;
-        const double mean = validate(drawing, r.calibration, views(truth, how), "others").after.mean_m;
+        const Calibration& found = r.calibration;
+        EXPECT_LT(longest_mm(found, drawing), 2) << file << " " << tilt_deg;
+        const double mean = mean_on_others(drawing, found, truth, how);
         EXPECT_LT(mean, 0.12e-3) << file << " " << tilt_deg << (pose ? " pose" : " position");
       }
     }
@@ -129,11 +137,9 @@ TEST(NearParallel, ASmallCornerOfTheWorkspaceLetsNothingRunOff) {
       Views how;
       how.count = 200;
       how.spread_rad = radians(spread_deg);
-      const Identification r = identify(drawing, views(truth, how), "data", geometry());
-      EXPECT_TRUE(r.fit.converged);
-      std::printf("%s, +-%.0f deg: longest change %.2f mm\n", file, spread_deg,
-                  longest_mm(r.calibration, drawing));
-      EXPECT_LT(longest_mm(r.calibration, drawing), 10) << file << " " << spread_deg;
+      const double longest = longest_mm(identified(drawing, truth, how).calibration, drawing);
+      std::printf("%s, +-%.0f deg: longest change %.2f mm\n", file, spread_deg, longest);
+      EXPECT_LT(longest, 10) << file << " " << spread_deg;
     }
   }
 }
@@ -150,14 +156,11 @@ TEST(NearParallel, ADrawingThatIsSlightlyOffParallelTakesEitherParameter) {
     EXPECT_EQ(takes_beta(drawing.nominal)[1], tilt_deg < 15);
     EXPECT_EQ(takes_beta(drawing.nominal)[2], tilt_deg < 15);
     const Robot truth = manufactured(drawing, 0, 8);
-    Views how;
-    const Identification r = identify(drawing, views(truth, how), "data", geometry());
-    EXPECT_TRUE(r.fit.converged);
-    how.seed = 99;
-    const double mean = validate(drawing, r.calibration, views(truth, how), "others").after.mean_m;
+    const Calibration found = identified(drawing, truth).calibration;
+    const double mean = mean_on_others(drawing, found, truth);
     std::printf("drawn %.2f deg off parallel: longest change %.2f mm, %.4f mm on others\n", tilt_deg,
-                longest_mm(r.calibration, drawing), mean * 1e3);
-    EXPECT_LT(longest_mm(r.calibration, drawing), 10) << tilt_deg;
+                longest_mm(found, drawing), mean * 1e3);
+    EXPECT_LT(longest_mm(found, drawing), 10) << tilt_deg;
     EXPECT_LT(mean, 0.12e-3) << tilt_deg;
   }
 }
@@ -227,12 +230,9 @@ TEST(NearParallel, AMakersCalibratedTableIsImportedAndIdentifiedFrom) {
     start.position_sigma_m = drawing.position_sigma_m;
     start.orientation_sigma_rad = drawing.orientation_sigma_rad;
     const Robot truth = manufactured(maker, 0, seed + 100);
-    const Identification r = identify(start, views(truth, Views()), "data", geometry());
-    EXPECT_TRUE(r.fit.converged);
-    EXPECT_LT(longest_mm(r.calibration, start), 5);
-    Views others;
-    others.seed = 99;
-    EXPECT_LT(validate(start, r.calibration, views(truth, others), "others").after.mean_m, 0.12e-3);
+    const Calibration found = identified(start, truth).calibration;
+    EXPECT_LT(longest_mm(found, start), 5);
+    EXPECT_LT(mean_on_others(start, found, truth), 0.12e-3);
   }
   std::printf("longest d in the tables: %.0f m\n", longest);
   EXPECT_GT(longest, 100);

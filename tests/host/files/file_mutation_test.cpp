@@ -9,7 +9,6 @@
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
-#include "model/effects.hpp"
 #include "model/parameter_image.hpp"
 #include "support/mutation.hpp"
 #include "support/robot_files.hpp"

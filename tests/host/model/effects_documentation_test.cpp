@@ -10,12 +10,10 @@
 #include <set>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "files/calibration_file.hpp"
 #include "files/read_file.hpp"
 #include "files/write_file.hpp"
-#include "model/covariate.hpp"
 #include "model/effects.hpp"
 #include "model/place.hpp"
 #include "support/robot_files.hpp"
