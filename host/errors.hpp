@@ -19,39 +19,39 @@ enum class ExitStatus : int {
   not_trustworthy = 5  ///< DoubtfulResult
 };
 
-/// The bus or the device refused or did not answer. Message: `can:vcan0:5: there is no interface 'vcan0'`.
-class BusError : public std::runtime_error {
+/// What an error is about beside its message.
+class CodedError : public std::runtime_error {
  public:
-  BusError(const std::string& address, const std::string& text, ErrorCode code = ErrorCode::none)
-      : std::runtime_error(address + ": " + text), address_(address), code_(code) {}
-  const std::string& address() const { return address_; }
+  CodedError(const std::string& what, ErrorCode code) : std::runtime_error(what), code_(code) {}
   ErrorCode code() const { return code_; }
 
  private:
-  std::string address_;
   ErrorCode code_;
 };
 
-/// An argument of a call that does not suit the other input. What it is called is the caller's to say.
-class ArgumentError : public std::runtime_error {
+/// The bus or the device refused or did not answer. Message: `can:vcan0:5: there is no interface 'vcan0'`.
+class BusError : public CodedError {
  public:
-  ArgumentError(ErrorCode code, const std::string& what) : std::runtime_error(what), code_(code) {}
-  ErrorCode code() const { return code_; }
+  BusError(const std::string& address, const std::string& text, ErrorCode code = ErrorCode::none)
+      : CodedError(address + ": " + text, code), address_(address) {}
+  const std::string& address() const { return address_; }
 
  private:
-  ErrorCode code_;
+  std::string address_;
+};
+
+/// An argument of a call that does not suit the other input. What it is called is the caller's to say.
+class ArgumentError : public CodedError {
+ public:
+  ArgumentError(ErrorCode code, const std::string& what) : CodedError(what, code) {}
 };
 
 /// The work was done and its files were written, but the result must not be relied on. The message says why, and what
 /// would cure it.
-class DoubtfulResult : public std::runtime_error {
+class DoubtfulResult : public CodedError {
  public:
   explicit DoubtfulResult(const std::string& what, ErrorCode code = ErrorCode::none)
-      : std::runtime_error(what), code_(code) {}
-  ErrorCode code() const { return code_; }
-
- private:
-  ErrorCode code_;
+      : CodedError(what, code) {}
 };
 
 }  // namespace flexcomp::host

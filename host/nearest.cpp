@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nearest.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
@@ -56,6 +58,13 @@ std::string nearest(std::string_view name, std::span<const std::string> known) {
     }
   }
   return best;
+}
+
+std::string expected_name(std::string_view wrong, std::span<const std::string> known, std::string_view one_of,
+                          std::string_view a_known) {
+  const std::string near = nearest(wrong, known);
+  return near.empty() ? fmt::format("{} {}", one_of, fmt::join(known, ", "))
+                      : fmt::format("{} (did you mean '{}'?)", a_known, near);
 }
 
 }  // namespace flexcomp::host

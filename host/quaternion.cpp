@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "quaternion.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace flexcomp::host {
@@ -28,6 +30,11 @@ std::optional<Eigen::Quaterniond> unit_quaternion(const std::array<double, 4>& w
   if (!(std::abs(norm - 1) <= 1e-3)) return {};
   if (std::abs(norm - 1) > 1e-15) q.coeffs() /= norm;
   return upper_half(q);
+}
+
+std::string norm_text(const std::array<double, 4>& wxyz) {
+  // No overflow of squares, however far off the numbers are.
+  return fmt::format("norm {:.6g}", std::hypot(std::hypot(wxyz[0], wxyz[1]), std::hypot(wxyz[2], wxyz[3])));
 }
 
 Eigen::Quaterniond unit_quaternion(const Eigen::Matrix3d& rotation) {

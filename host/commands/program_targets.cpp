@@ -8,7 +8,6 @@
 
 #include "commands/numbers.hpp"
 #include "commands/progress_bar.hpp"
-#include "exchange/program_commands.hpp"
 #include "exchange/target_program.hpp"
 #include "flexcomp/model.hpp"
 #include "units.hpp"

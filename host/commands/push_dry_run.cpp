@@ -10,7 +10,7 @@
 #include "files/robot_file.hpp"
 #include "json.hpp"
 #include "model/parameter_image.hpp"
-#include "model/set_difference_json.hpp"
+#include "model/set_difference.hpp"
 
 namespace flexcomp::host {
 

@@ -2,9 +2,10 @@
 #include "exchange/arm_sides.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
+
+#include "exchange/axis_chain.hpp"
 
 namespace flexcomp::host {
 
@@ -12,25 +13,10 @@ namespace {
 
 constexpr double meets_m = 1e-5;
 
-/// Frames 0 … 6 in F0: Rot(z,theta + q) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta).
-std::array<Eigen::Isometry3d, joint_count + 1> frames(const NominalRobot<joint_count>& robot,
-                                                      const std::array<double, joint_count>& q_rad) {
-  std::array<Eigen::Isometry3d, joint_count + 1> out;
-  out[0].setIdentity();
-  for (std::size_t i = 0; i < joint_count; ++i) {
-    const NominalLink& link = robot.links[i];
-    out[i + 1] = out[i] * Eigen::AngleAxisd(link.theta_rad + q_rad[i], Eigen::Vector3d::UnitZ()) *
-                 Eigen::Translation3d(link.a_m, 0, link.d_m) *
-                 Eigen::AngleAxisd(link.alpha_rad, Eigen::Vector3d::UnitX()) *
-                 Eigen::AngleAxisd(link.beta_rad, Eigen::Vector3d::UnitY());
-  }
-  return out;
-}
-
 /// From the axis, which is z of `frame`, to `point`, at a right angle to it.
-Eigen::Vector3d from_axis(const Eigen::Isometry3d& frame, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d z = frame.linear().col(2);
-  const Eigen::Vector3d away = point - frame.translation();
+Eigen::Vector3d from_axis(const Pose<double>& frame, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d z = frame.rotation.col(2);
+  const Eigen::Vector3d away = point - frame.position;
   return away - z * z.dot(away);
 }
 
@@ -40,21 +26,21 @@ struct Arm {
 };
 
 std::optional<Arm> arm(const NominalRobot<joint_count>& robot, const std::array<double, joint_count>& q_rad) {
-  const auto f = frames(robot, q_rad);
+  const auto f = link_frames(robot, q_rad);
   // Where axis 4 is nearest to axis 5.
-  const Eigen::Vector3d a = f[3].linear().col(2);
-  const Eigen::Vector3d b = f[4].linear().col(2);
-  const Eigen::Vector3d apart = f[4].translation() - f[3].translation();
+  const Eigen::Vector3d a = f[3].rotation.col(2);
+  const Eigen::Vector3d b = f[4].rotation.col(2);
+  const Eigen::Vector3d apart = f[4].position - f[3].position;
   const double ab = a.dot(b);
   if (1 - ab * ab < 1e-6) return {};
-  const Eigen::Vector3d wrist = f[3].translation() + a * ((a - ab * b).dot(apart) / (1 - ab * ab));
+  const Eigen::Vector3d wrist = f[3].position + a * ((a - ab * b).dot(apart) / (1 - ab * ab));
   for (const std::size_t axis : {4U, 5U}) {
     if (from_axis(f[axis], wrist).norm() > meets_m) return {};
   }
-  const Eigen::Vector3d axis_2 = f[1].linear().col(2);
-  const Eigen::Vector3d lower_arm = from_axis(f[1], f[2].translation());
+  const Eigen::Vector3d axis_2 = f[1].rotation.col(2);
+  const Eigen::Vector3d lower_arm = from_axis(f[1], f[2].position);
   if (lower_arm.norm() < meets_m) return {};
-  return Arm{f[1].linear().transpose() * from_axis(f[0], wrist),
+  return Arm{f[1].rotation.transpose() * from_axis(f[0], wrist),
              -axis_2.dot(lower_arm.normalized().cross(from_axis(f[2], wrist)))};
 }
 

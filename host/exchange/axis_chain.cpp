@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "model/frames.hpp"
 #include "quaternion.hpp"
@@ -124,6 +123,20 @@ Pose<double> link_pose(const NominalLink& link, double q_rad) {
   return pose;
 }
 
+std::array<Pose<double>, joint_count + 1> link_frames(const NominalRobot<joint_count>& robot,
+                                                      const std::array<double, joint_count>& q_rad) {
+  std::array<Pose<double>, joint_count + 1> frames;
+  for (std::size_t i = 0; i < joint_count; ++i)
+    frames[i + 1] = frames[i] * link_pose(robot.links[i], q_rad[i]);
+  return frames;
+}
+
+Pose<double> tool_pose(const NominalRobot<joint_count>& robot) {
+  const auto& [w, x, y, z] = robot.tool_wxyz;
+  const auto& t = robot.tool_xyz_m;
+  return {Eigen::Quaterniond(w, x, y, z).toRotationMatrix(), {t[0], t[1], t[2]}};
+}
+
 LinkChain links_of(const AxisChain& chain) {
   LinkChain out;
   out.base_to_f0 = nearest_frame(chain.axes[0]);
@@ -163,15 +176,11 @@ AxisChain axes_of(const UrdfArm& arm) {
 
 AxisChain axes_of(const NominalRobot<joint_count>& robot) {
   AxisChain chain;
-  Pose<double> frame;
-  for (std::size_t i = 0; i < joint_count; ++i) {
-    chain.axes[i] = {frame.position, frame.rotation.col(2)};
-    frame = frame * link_pose(robot.links[i], 0);
-  }
-  chain.flange = frame;
-  const auto& [w, x, y, z] = robot.tool_wxyz;
-  const auto& t = robot.tool_xyz_m;
-  chain.tip = frame * Pose<double>{Eigen::Quaterniond(w, x, y, z).toRotationMatrix(), {t[0], t[1], t[2]}};
+  const auto frames = link_frames(robot);
+  for (std::size_t i = 0; i < joint_count; ++i)
+    chain.axes[i] = {frames[i].position, frames[i].rotation.col(2)};
+  chain.flange = frames.back();
+  chain.tip = chain.flange * tool_pose(robot);
   return chain;
 }
 

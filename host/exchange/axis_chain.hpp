@@ -59,6 +59,13 @@ LinkChain links_of(const AxisChain& chain);
 /// Rot(z,theta + q) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta).
 Pose<double> link_pose(const NominalLink& link, double q_rad);
 
+/// Frames 0 … 6 in F0.
+std::array<Pose<double>, joint_count + 1> link_frames(const NominalRobot<joint_count>& robot,
+                                                      const std::array<double, joint_count>& q_rad = {});
+
+/// Ftool in F6.
+Pose<double> tool_pose(const NominalRobot<joint_count>& robot);
+
 /// The axes and frames of a description of ROS, seen from its base link.
 AxisChain axes_of(const UrdfArm& arm);
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <map>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "files/csv.hpp"
@@ -28,16 +29,7 @@ constexpr unsigned domain_object = 2;
 constexpr unsigned record_object = 9;
 
 const char* access(co::Access a) {
-  switch (a) {
-    case co::Access::constant:
-      return "const";
-    case co::Access::ro:
-      return "ro";
-    case co::Access::wo:
-      return "wo";
-    default:
-      return "rw";
-  }
+  return a == co::Access::constant ? "const" : a == co::Access::ro ? "ro" : a == co::Access::wo ? "wo" : "rw";
 }
 
 /// Keys and values of one section; CiA 306 ends lines with CR LF.
@@ -119,6 +111,15 @@ std::vector<Field> named(std::vector<Field> fields, const std::vector<std::strin
   return fields;
 }
 
+/// "name, name|unit"
+void add(std::vector<std::string>& names, std::string_view list) {
+  constexpr std::string_view comma = ", ";
+  for (auto end = list.find(comma); end != list.npos; end = list.find(comma)) {
+    names.emplace_back(list.substr(0, end));
+    list.remove_prefix(end + comma.size());
+  }
+  names.emplace_back(list);
+}
 /// joint 1 … joint 6
 void add_each(std::vector<std::string>& names, const std::string& stem, const std::string& unit) {
   for (std::size_t j = 1; j <= wire::joints; ++j) names.push_back(fmt::format("{}{}|{}", stem, j, unit));
@@ -135,48 +136,22 @@ std::vector<Field> fields_of(map::Block block) {
     case Block::capability: {
       wire::Capability record;
       wire::detail::visit_capability(record, walk);
-      names = {"protocol",
-               "joints",
-               "scalar_bytes",
-               "schema",
-               "bases",
-               "flags",
-               "terms",
-               "tables",
-               "values",
-               "image_bytes",
-               "cycle|us",
-               "fade_cycles",
-               "firmware",
-               "nominal_hash",
-               "name_hash",
-               "plausible_position|m",
-               "plausible_orientation|rad",
-               "largest_correction|rad"};
-      return named(walk.fields, names);
+      add(names,
+          "protocol, joints, scalar_bytes, schema, bases, flags, terms, tables, values, image_bytes, "
+          "cycle|us, fade_cycles, firmware, nominal_hash, name_hash, plausible_position|m, "
+          "plausible_orientation|rad, largest_correction|rad");
+      break;
     }
     case Block::status: {
       wire::Status record;
       wire::detail::visit_status(record, walk);
-      names = {"state",
-               "answer",
-               "refusal",
-               "faults",
-               "detail",
-               "active_slot",
-               "settled",
-               "active_sequence",
-               "active_bytes",
-               "active_crc",
-               "previous_sequence",
-               "announced_bytes",
-               "staged_bytes",
-               "trial_cycles_left",
-               "cycles"};
+      add(names,
+          "state, answer, refusal, faults, detail, active_slot, settled, active_sequence, active_bytes, "
+          "active_crc, previous_sequence, announced_bytes, staged_bytes, trial_cycles_left, cycles");
       for (std::size_t k = 0; k < 6; ++k)
         names.push_back(fmt::format("cycles_{}", name(static_cast<StepStatus>(k))));
       names.emplace_back("last_status");
-      return named(walk.fields, names);
+      break;
     }
     case Block::probe_request: {
       wire::ProbeRequest record;
@@ -185,51 +160,46 @@ std::vector<Field> fields_of(map::Block block) {
       names.emplace_back("payload|kg");
       add_xyz(names, "payload_com", "m");
       add_xyz(names, "force", "N");
-      names.insert(names.end(), {"temperature|deg C", "time|s"});
+      add(names, "temperature|deg C, time|s");
       add_each(names, "direction", "");
       add_each(names, "relative_speed", "");
-      return named(walk.fields, names);
+      break;
     }
     case Block::probe_response: {
       wire::ProbeResponse record;
       wire::detail::visit_probe_response(record, walk);
       add_each(names, "q", "rad");
-      names.insert(names.end(),
-                   {"missed_position|m", "missed_orientation|rad", "status", "slot", "sequence"});
-      return named(walk.fields, names);
+      add(names, "missed_position|m, missed_orientation|rad, status, slot, sequence");
+      break;
     }
     case Block::robot: {
       NominalRobot<wire::joints> record;
       wire::detail::visit_robot(record, walk);
-      for (std::size_t i = 1; i <= wire::joints; ++i) {
-        for (const char* key : {"theta|rad", "d|m", "a|m", "alpha|rad", "beta|rad"})
-          names.push_back(fmt::format("link{}_{}", i, key));
-      }
-      for (std::size_t i = 1; i <= wire::joints; ++i) {
-        names.push_back(fmt::format("joint{}_min|rad", i));
-        names.push_back(fmt::format("joint{}_max|rad", i));
-      }
+      for (std::size_t i = 1; i <= wire::joints; ++i)
+        add(names,
+            fmt::format("link{0}_theta|rad, link{0}_d|m, link{0}_a|m, link{0}_alpha|rad, link{0}_beta|rad",
+                        i));
+      for (std::size_t i = 1; i <= wire::joints; ++i)
+        add(names, fmt::format("joint{0}_min|rad, joint{0}_max|rad", i));
       add_xyz(names, "gravity", "m/s^2");
       add_xyz(names, "tool", "m");
-      for (const char* part : {"w", "x", "y", "z"}) names.push_back(fmt::format("tool_q{}", part));
-      names.emplace_back("payload|kg");
+      add(names, "tool_qw, tool_qx, tool_qy, tool_qz, payload|kg");
       add_xyz(names, "payload_com", "m");
       names.emplace_back("reference_temperature|deg C");
-      std::vector<Field> fields = named(walk.fields, names);
-      fields.push_back({"name_bytes", "u16", 2, ""});
-      fields.push_back({"name", "bytes", wire::robot_name_bytes, ""});
-      return fields;
+      // The robot's name is no part of the walk.
+      walk.fields.push_back({"name_bytes", "u16", 2, ""});
+      walk.fields.push_back({"name", "bytes", wire::robot_name_bytes, ""});
+      break;
     }
-    case Block::corrections: {
-      std::vector<Field> fields;
-      for (std::size_t j = 1; j <= wire::joints; ++j)
-        fields.push_back({fmt::format("correction{}", j), "f32", 4, "deg"});
-      fields.push_back({"largest_correction", "f32", 4, "deg"});
-      return fields;
-    }
+    case Block::corrections:
+      walk.fields.assign(wire::joints + 1, {"", "f32", 4, ""});
+      add_each(names, "correction", "deg");
+      names.emplace_back("largest_correction|deg");
+      break;
     default:
       return {};
   }
+  return named(walk.fields, names);
 }
 
 }  // namespace
@@ -264,12 +234,9 @@ std::string electronic_data_sheet(const std::string& file) {
     sheet.put(fmt::format("BaudRate_{}", rate), 1);
   sheet.put("SimpleBootUpMaster", 0);
   sheet.put("SimpleBootUpSlave", 1);
-  sheet.put("Granularity", 0);
-  sheet.put("DynamicChannelsSupported", 0);
-  sheet.put("GroupMessaging", 0);
-  sheet.put("NrOfRXPDO", 0);
-  sheet.put("NrOfTXPDO", 0);
-  sheet.put("LSS_Supported", 0);
+  for (const char* none : {"Granularity", "DynamicChannelsSupported", "GroupMessaging", "NrOfRXPDO",
+                           "NrOfTXPDO", "LSS_Supported"})
+    sheet.put(none, 0);
   sheet.section("DummyUsage");
   for (unsigned k = 1; k <= 7; ++k) sheet.put(fmt::format("Dummy{:04X}", k), 0);
   sheet.section("Comments");

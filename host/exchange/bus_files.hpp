@@ -5,7 +5,6 @@
 #ifndef FLEXCOMP_HOST_EXCHANGE_BUS_FILES_HPP
 #define FLEXCOMP_HOST_EXCHANGE_BUS_FILES_HPP
 
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>

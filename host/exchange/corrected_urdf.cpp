@@ -4,27 +4,25 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <optional>
-#include <random>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include "exchange/axis_chain.hpp"
-#include "exchange/urdf_text.hpp"
+#include "exchange/rotation_angles.hpp"
+#include "exchange/text_edits.hpp"
+#include "exchange/xml.hpp"
 #include "files/read_file.hpp"
-#include "flexcomp/forward.hpp"
-#include "flexcomp/model.hpp"
 #include "input_error.hpp"
 #include "linalg/decompositions.hpp"
 #include "linalg/nearest_rotation.hpp"
 #include "model/effects.hpp"
 #include "model/frames.hpp"
-#include "model/host_model.hpp"
+#include "model/set_difference.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -33,7 +31,6 @@ namespace {
 
 /// The rounding of a drawing's right angles (some 1e-9 rad) and of tables to 1e-10 mm stays far below.
 constexpr double same_axis = 1e-6;
-using Frames = std::array<Pose<double>, joint_count + 1>;
 
 double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
@@ -102,11 +99,8 @@ Geometry geometry(const NominalRobot<joint_count>& nominal, const TermSet& set) 
       *slots[t.place.slot] += t.coefficient;
     }
   }
-  const auto& [w, x, y, z] = nominal.tool_wxyz;
-  const auto& p = nominal.tool_xyz_m;
   out.base = small_pose(base);
-  out.tool =
-      Pose<double>{Eigen::Quaterniond(w, x, y, z).toRotationMatrix(), {p[0], p[1], p[2]}} * small_pose(tool);
+  out.tool = tool_pose(nominal) * small_pose(tool);
   return out;
 }
 
@@ -114,6 +108,87 @@ Pose<double> product(const std::vector<UrdfStep>& steps, std::size_t from, std::
   Pose<double> out;
   for (std::size_t k = from; k < to; ++k) out = out * steps[k].origin;
   return out;
+}
+
+// --- the text of a URDF with the origins of some joints replaced and every other byte as it was ---------------------
+
+/// A link to be added before the end of the robot, on a fixed joint.
+struct AddedLink {
+  std::string parent;
+  std::string suffix;  ///< its name is the parent's with this behind
+  Pose<double> origin;
+};
+
+std::string numbers(const Eigen::Vector3d& v) {
+  // To 1e-15: what arithmetic made 0.29999999999999993 is 0.3 again, and a zero is a zero.
+  const auto plain = [](double x) {
+    const double rounded = std::round(x * 1e15) / 1e15;
+    return rounded == 0 ? std::string("0") : fmt::format("{:.15g}", rounded);
+  };
+  return fmt::format("{} {} {}", plain(v.x()), plain(v.y()), plain(v.z()));
+}
+
+std::string xyz(const Pose<double>& pose) { return numbers(pose.position); }
+std::string rpy(const Pose<double>& pose) { return numbers(roll_pitch_yaw(pose.rotation)); }
+
+std::string origin_tag(const Pose<double>& pose) {
+  return fmt::format("<origin xyz=\"{}\" rpy=\"{}\"/>", xyz(pose), rpy(pose));
+}
+
+void set_origin(const XmlElement& joint, const Pose<double>& pose, TextEdits& edits) {
+  const XmlElement* const origin = joint.child("origin");
+  if (origin == nullptr) return edits.replace({joint.start_tag.end, joint.start_tag.end}, origin_tag(pose));
+  std::string missing;
+  const auto set = [&](const char* name, const std::string& value) {
+    if (const XmlAttribute* const attribute = origin->attribute(name)) {
+      edits.replace(attribute->span, value);
+    } else {
+      missing += fmt::format(" {}=\"{}\"", name, value);
+    }
+  };
+  set("xyz", xyz(pose));
+  set("rpy", rpy(pose));
+  const std::size_t behind_name = origin->start_tag.begin + 1 + origin->name.size();
+  if (!missing.empty()) edits.replace({behind_name, behind_name}, missing);
+}
+
+void add_link(const XmlElement& robot, const std::string& text, const AddedLink& added, TextEdits& edits) {
+  for (const XmlElement& link : robot.children) {
+    const XmlAttribute* const name = link.attribute("name");
+    if (link.name != "link" || name == nullptr || name->value != added.parent) continue;
+    // As written there, thus in the document's encoding and with its references.
+    const std::string parent = text.substr(name->span.begin, name->span.end - name->span.begin);
+    const char quote = text[name->span.end];
+    const std::string child = parent + added.suffix;
+    return edits.replace(
+        {robot.end_tag, robot.end_tag},
+        fmt::format("  <link name={0}{2}{0}/>\n  <joint name={0}{2}_joint{0} type=\"fixed\"><parent "
+                    "link={0}{1}{0}/><child link={0}{2}{0}/>{3}</joint>\n",
+                    quote, parent, child, origin_tag(added.origin)));
+  }
+  throw std::invalid_argument("a link that is not in the text");
+}
+
+/// Sets xyz and rpy of these joints' origins, rounded to 1e-15 m and rad; a joint without <origin> gets one.
+/// \throws InputError  as parse_xml()
+/// \throws std::invalid_argument  a joint or link that the text does not have under <robot>, or has twice
+std::string with_origins(const std::string& path, const std::string& text,
+                         const std::map<std::string, Pose<double>>& origins,
+                         const std::optional<AddedLink>& added) {
+  const XmlElement robot = parse_xml(path, text);
+  TextEdits edits;
+  std::size_t found = 0;
+  for (const XmlElement& joint : robot.children) {
+    const XmlAttribute* const name = joint.attribute("name");
+    if (joint.name != "joint" || name == nullptr) continue;
+    const auto origin = origins.find(name->value);
+    if (origin == origins.end()) continue;
+    ++found;
+    set_origin(joint, origin->second, edits);
+  }
+  if (found != origins.size()) throw std::invalid_argument("a joint that is not in the text, or twice");
+  if (added) add_link(robot, text, *added, edits);
+  return edits.applied_to(text);
 }
 
 }  // namespace
@@ -214,9 +289,7 @@ LeftOut left_out_by_rigid(const Calibration& calibration, const Robot& robot, st
   const TermSet& set = calibration.terms;
   LeftOut out;
   out.poses = poses;
-  const auto rigid = prepare(rigid_part(set), robot, calibration.path);
-  const auto whole = prepare(set, robot, calibration.path);
-  std::vector<std::unique_ptr<HostModel>> single;
+  std::vector<TermSet> single;
   for (const EffectGroup& group : effects_of(set, robot.nominal)) {
     if (belongs_to_measurement(group.id.effect)) continue;
     TermSet one = rigid_part(set);
@@ -226,30 +299,21 @@ LeftOut left_out_by_rigid(const Calibration& calibration, const Robot& robot, st
     std::set<std::size_t> of_group;
     for (const Parameter& p : group.parameters) of_group.insert(p.terms.begin(), p.terms.end());
     for (const std::size_t t : of_group) one.terms.push_back(set.terms[t]);
-    single.push_back(prepare(one, robot, calibration.path));
+    single.push_back(std::move(one));
     out.effects.push_back({name(group.id), 0, 0});
   }
   if (out.effects.empty()) return out;
-  std::mt19937_64 random(1);
-  Workspace<double, joint_count> workspace;
-  for (std::size_t n = 0; n < poses; ++n) {
-    std::array<double, joint_count> q{};
-    auto context = default_context<double>(robot.nominal);
-    if (n % 2 == 1) context.payload_kg = 0;
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      const JointLimits& l = robot.nominal.limits[j];
-      q[j] = std::uniform_real_distribution<double>(l.min_rad, l.max_rad)(random);
-      context.direction[j] = random() % 2 == 0 ? 1 : -1;
-    }
-    const Pose<double> from = forward(*rigid, q, context, workspace);
-    const auto add = [&](const HostModel& model, double& largest_m, double& largest_rad) {
-      const Pose<double> to = forward(model, q, context, workspace);
-      largest_m = std::max(largest_m, (to.position - from.position).norm());
-      largest_rad = std::max(largest_rad, angle_between(from.rotation, to.rotation));
-    };
-    add(*whole, out.largest_m, out.largest_rad);
-    for (std::size_t k = 0; k < single.size(); ++k)
-      add(*single[k], out.effects[k].largest_m, out.effects[k].largest_rad);
+  std::vector<RandomPlace> places = random_places(robot, poses);
+  for (std::size_t n = 1; n < places.size(); n += 2) places[n].context.payload_kg = 0;
+  const auto at_all = [&](const TermSet& terms) { return poses_of(terms, robot, places, calibration.path); };
+  const std::vector<Pose<double>> from = at_all(rigid_part(set));
+  const ToolShift all = tool_shift(from, at_all(set));
+  out.largest_m = all.largest_m;
+  out.largest_rad = all.largest_rad;
+  for (std::size_t k = 0; k < single.size(); ++k) {
+    const ToolShift alone = tool_shift(from, at_all(single[k]));
+    out.effects[k].largest_m = alone.largest_m;
+    out.effects[k].largest_rad = alone.largest_rad;
   }
   return out;
 }

@@ -230,9 +230,8 @@ void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, cons
     return;
   }
   char seen = 0;
-  std::size_t first_line = 0;
+  const TextRow* first = nullptr;
   std::size_t first_column = 0;
-  std::string first_cell;
   bool sure = false;
   for (const TextRow& row : rows) {
     for (const std::size_t c : columns) {
@@ -245,26 +244,26 @@ void DelimitedText::settle_decimal(const std::vector<std::size_t>& columns, cons
         throw InputError(path, row.line, column_label(c),
                          seen == 0 || (point && comma)
                              ? std::string("a number with a decimal point or a decimal comma alone")
-                             : fmt::format("a decimal '{}' as in line {}", seen, first_line),
+                             : fmt::format("a decimal '{}' as in line {}", seen, first->line),
                          "'" + cell + "'");
       }
       if (seen == 0) {
-        first_line = row.line;
+        first = &row;
         first_column = c;
-        first_cell = cell;
       }
       seen = mark;
       sure = sure || mark == '.' || !may_part_thousands(cell) ||
              std::find(small.begin(), small.end(), c) != small.end();
     }
   }
-  if (seen != 0 && !sure) {
+  if (seen == 0) return;
+  if (!sure) {
     throw InputError(
-        path, first_line, column_label(first_column),
+        path, first->line, column_label(first_column),
         "a number whose comma is certainly a decimal comma; commas that separate thousands are not read",
-        "'" + first_cell + "'", ambiguous);
+        "'" + first->cells[first_column] + "'", ambiguous);
   }
-  if (seen != 0) dialect.decimal = seen;
+  dialect.decimal = seen;
 }
 
 double DelimitedText::number(const TextRow& row, std::size_t column, const Unit& unit) const {

@@ -30,13 +30,6 @@ void put_links(const LinkChain& links, ImportedArm& arm) {
   arm.f0_is_base = links.f0_is_base;
 }
 
-/// Frame i (0: F0) with all readings at zero.
-std::array<Pose<double>, joint_count + 1> frames_of(const NominalRobot<joint_count>& robot) {
-  std::array<Pose<double>, joint_count + 1> frames;
-  for (std::size_t i = 0; i < joint_count; ++i) frames[i + 1] = frames[i] * link_pose(robot.links[i], 0);
-  return frames;
-}
-
 }  // namespace
 
 ImportedArm import_urdf(const std::string& path, const UrdfLinks& links) {
@@ -63,9 +56,9 @@ ImportedArm import_urdf(const std::string& path, const UrdfLinks& links) {
 ImportedArm import_robot(const std::string& path) {
   ImportedArm arm;
   arm.robot = load_robot(path, LongLinks::taken);
-  const auto before = frames_of(arm.robot.nominal);
+  const auto before = link_frames(arm.robot.nominal);
   put_links(links_of(axes_of(arm.robot.nominal)), arm);
-  const auto after = frames_of(arm.robot.nominal);
+  const auto after = link_frames(arm.robot.nominal);
   const auto carried = [&](std::size_t frame, const Eigen::Vector3d& p) -> Eigen::Vector3d {
     return after[frame].rotation.transpose() *
            (before[frame].rotation * p + before[frame].position - after[frame].position);

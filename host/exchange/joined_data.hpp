@@ -4,7 +4,6 @@
 #ifndef FLEXCOMP_HOST_EXCHANGE_JOINED_DATA_HPP
 #define FLEXCOMP_HOST_EXCHANGE_JOINED_DATA_HPP
 
-#include <map>
 #include <string>
 #include <vector>
 

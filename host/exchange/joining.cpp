@@ -40,12 +40,8 @@ std::string last_part(const std::string& name) {
 
 InputError seen_before(const PointList& list, const ListedPoint& p, const ListedPoint& before,
                        ErrorCode code) {
-  return {list.path,
-          p.line,
-          p.name,
-          fmt::format("a point that line {} has not", before.line),
-          "the same name again",
-          code};
+  return InputError(list.path, p.line, p.name, fmt::format("a point that line {} has not", before.line),
+                    "the same name again", code);
 }
 
 const char* const other_name = ", a name of another kind";

@@ -124,6 +124,11 @@ class PointReader {
   bool has(const std::string& role) const { return columns_.contains(role); }
   std::size_t header_line() const { return table_.header ? table_.header->line : table_.rows.front().line; }
 
+  InputError error(const std::string& field, const std::string& expected, const std::string& found,
+                   ErrorCode code = ErrorCode::none) const {
+    return {table_.path, header_line(), field, expected, found, code};
+  }
+
   void find_columns() {
     const std::size_t count = table_.rows.front().cells.size();
     if (!options_.columns.empty()) {
@@ -155,26 +160,22 @@ class PointReader {
     // The same twice, as parts and as their sum: the parts are what an instrument knows.
     if (has("sigma") && has("sx")) {
       if (!options_.columns.empty()) {
-        throw InputError(table_.path, header_line(), "columns", "sigma or sx, sy, sz", "both",
-                         ErrorCode::argument);
+        throw error("columns", "sigma or sx, sy, sz", "both", ErrorCode::argument);
       }
       unused_.push_back(table_.column_label(columns_.at("sigma")));
       columns_.erase("sigma");
     }
     if (int(has("rx")) + int(has("a")) + int(has("qw")) > 1) {
-      throw InputError(table_.path, header_line(), "", "one orientation", "several",
-                       ErrorCode::several_orientations);
+      throw error("", "one orientation", "several", ErrorCode::several_orientations);
     }
-    if (has("date") && !has("time"))
-      throw InputError(table_.path, header_line(), "date", "a time beside the date", "none");
+    if (has("date") && !has("time")) throw error("date", "a time beside the date", "none");
   }
 
   void take(const std::string& role, std::size_t column) {
     const auto [at, is_new] = columns_.emplace(role, column);
     if (!is_new) {
-      throw InputError(table_.path, header_line(), table_.column_label(column),
-                       fmt::format("one column of {}", role),
-                       "another one: " + table_.column_label(at->second), ErrorCode::ambiguous_column);
+      throw error(table_.column_label(column), fmt::format("one column of {}", role),
+                  "another one: " + table_.column_label(at->second), ErrorCode::ambiguous_column);
     }
   }
 
@@ -216,18 +217,17 @@ class PointReader {
       if (!has(role)) missing.push_back(role);
     }
     if (missing.empty() || (or_none && missing.size() == roles.size())) return;
-    throw InputError(table_.path, header_line(), fmt::format("{}", fmt::join(missing, ", ")),
-                     fmt::format("a column for each of {}", fmt::join(roles, ", ")), "none");
+    throw error(fmt::format("{}", fmt::join(missing, ", ")),
+                fmt::format("a column for each of {}", fmt::join(roles, ", ")), "none");
   }
 
   /// The unit of a kind of columns, on which the header, the lines before it and the option must agree.
   Unit settle(const std::vector<std::string>& roles, const UnitSource& remark, const UnitSource& option,
               UnitOf unit_of, ErrorCode none, const char* kind, const std::vector<std::string>& known) const {
     if (const auto unit = agreed(roles, {remark}, option, unit_of, kind, known)) return *unit;
-    throw InputError(
-        table_.path, header_line(), fmt::format("{}", fmt::join(roles, ", ")),
-        fmt::format("a unit of {}: in the header (X [mm]), in a line above it (Units: mm)", kind),
-        fmt::format("none; the first row has {}", first_values(roles)), none);
+    throw error(fmt::format("{}", fmt::join(roles, ", ")),
+                fmt::format("a unit of {}: in the header (X [mm]), in a line above it (Units: mm)", kind),
+                fmt::format("none; the first row has {}", first_values(roles)), none);
   }
 
   /// The same, but nothing where nobody says one.
@@ -265,8 +265,8 @@ class PointReader {
     if (has("rx")) {
       angle_ = angle_of({"rx", "ry", "rz"});
       if (!options_.angles) {
-        throw InputError(table_.path, header_line(), "rx, ry, rz", "to be told what the angles mean",
-                         "nothing", ErrorCode::no_angle_convention);
+        throw error("rx, ry, rz", "to be told what the angles mean", "nothing",
+                    ErrorCode::no_angle_convention);
       }
     }
     if (has("a")) angle_ = angle_of({"a", "b", "c"});
@@ -290,8 +290,7 @@ class PointReader {
   /// An option for columns that are not there was meant for another file.
   void refuse_idle_options() const {
     const auto idle = [this](bool given, bool used, const char* argument, const char* columns) {
-      if (given && !used)
-        throw InputError(table_.path, header_line(), argument, columns, "none", ErrorCode::argument);
+      if (given && !used) throw error(argument, columns, "none", ErrorCode::argument);
     };
     idle(options_.angles.has_value(), has("rx"), "angles", "columns rx, ry, rz");
     idle(options_.angle.unit.has_value(), has("rx") || has("a"), "angle_unit",
@@ -322,11 +321,7 @@ class PointReader {
       const std::array<double, 4> wxyz{number(row, "qw", unit::si), number(row, "qx", unit::si),
                                        number(row, "qy", unit::si), number(row, "qz", unit::si)};
       const auto q = unit_quaternion(wxyz);
-      if (!q) {
-        throw InputError(table_.path, row.line, "qw qx qy qz", "a quaternion of norm 1 (within 0.001)",
-                         fmt::format("norm {:.6g}",
-                                     std::hypot(std::hypot(wxyz[0], wxyz[1]), std::hypot(wxyz[2], wxyz[3]))));
-      }
+      if (!q) throw InputError(table_.path, row.line, "qw qx qy qz", unit_quaternion_rule, norm_text(wxyz));
       p.orientation = *q;
     }
     if (has("rx")) p.orientation = rotation(*options_.angles, three(row, "rx", "ry", "rz", angle_));
@@ -374,10 +369,7 @@ PointList read_point_list(const std::string& path, const PointListOptions& optio
   for (const std::string& column : options.columns) {
     const auto& known = point_column_names();
     if (std::find(known.begin(), known.end(), column) != known.end()) continue;
-    const std::string near = nearest(column, known);
-    throw InputError("", 0, "columns",
-                     near.empty() ? fmt::format("names out of {}", fmt::join(known, ", "))
-                                  : fmt::format("a known name (did you mean '{}'?)", near),
+    throw InputError("", 0, "columns", expected_name(column, known, "names out of", "a known name"),
                      "'" + column + "'", ErrorCode::argument);
   }
   return PointReader(path, options).read();

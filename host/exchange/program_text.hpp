@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <map>
 #include <string>
@@ -29,7 +30,10 @@ void read_val3(TargetProgram& program);   ///< Stäubli
 constexpr std::size_t deepest_brackets = 8;
 
 /// For people, of text that may be long.
-std::string shortened(std::string_view text);
+inline std::string shortened(std::string_view text) {
+  constexpr std::size_t most = 40;
+  return text.size() <= most ? std::string(text) : std::string(text.substr(0, most)) + "…";
+}
 
 /// A program as its readers see it: characters with their lines, and the pieces that all languages have.
 class ProgramText {
@@ -54,8 +58,12 @@ class ProgramText {
   }
 
  protected:
-  static bool is_word(char c);   ///< a letter, a digit, _ or $
-  static bool is_blank(char c);  ///< also the end of a line
+  /// A letter, a digit, _ or $.
+  static bool is_word(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$';
+  }
+  /// Also the end of a line.
+  static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
   void warn(std::size_t at, const std::string& text) {
     program_.warnings.push_back(fmt::format("{}:{}: {}", program_.path, line(at), text));

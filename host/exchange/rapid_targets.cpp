@@ -350,10 +350,7 @@ class Rapid : public ProgramText {
       const std::vector<TextSpan> rotation = spans(l[1], 4);
       for (std::size_t k = 0; k < 4; ++k) q[k] = number(rotation[k], unit::si, "rot");
       const auto unit = unit_quaternion(q);
-      if (!unit) {
-        throw error(where, found.name, "a quaternion of norm 1 (within 0.001)",
-                    fmt::format("norm {:.6g}", Eigen::Quaterniond(q[0], q[1], q[2], q[3]).norm()));
-      }
+      if (!unit) throw error(where, found.name, unit_quaternion_rule, norm_text(q));
       found.orientation = *unit;
       found.numbers.insert(found.numbers.end(), rotation.begin(), rotation.end());
       found.quadrant_numbers = spans(l[2], 3);

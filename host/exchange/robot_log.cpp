@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 
 #include "exchange/declared_unit.hpp"
 #include "files/data_file.hpp"
@@ -174,13 +172,10 @@ LogMap load_log_map(const std::string& path) {
   }
   if (const auto context = root.find("context")) {
     for (const std::string& key : context->keys()) {
-      if (!one_of(context_names(), key)) {
-        const std::string near = nearest(key, context_names());
+      if (!one_of(context_names(), key))
         throw context->at(key).error(
-            near.empty() ? fmt::format("one of the columns {}", fmt::join(context_names(), ", "))
-                         : fmt::format("a column of a data file (did you mean '{}'?)", near),
+            expected_name(key, context_names(), "one of the columns", "a column of a data file"),
             "'" + key + "'");
-      }
       map.context.emplace_back(key, context->at(key).text());
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Targets in programs of robot makers: found, changed in place, and every other byte left as it was.
+/// Targets in programs of robot makers: found, as joint commands, changed in place, and every other byte left as it was.
 #ifndef FLEXCOMP_HOST_EXCHANGE_TARGET_PROGRAM_HPP
 #define FLEXCOMP_HOST_EXCHANGE_TARGET_PROGRAM_HPP
 
@@ -8,12 +8,15 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "exchange/text_edits.hpp"
+#include "flexcomp/linear.hpp"
 #include "model/robot.hpp"
+#include "model/targets.hpp"
 
 namespace flexcomp::host {
 
@@ -68,6 +71,18 @@ unsigned turn_of(const std::array<double, joint_count>& q_rad, unsigned before);
 std::array<int, 3> quadrants_of(const std::array<double, joint_count>& q_rad, std::array<int, 3> before);
 /// Whether readings are those that the target's words ask for.
 bool words_fit(const ProgramTarget& target, const std::array<double, joint_count>& q_rad);
+
+/// The targets as joint commands, poses by the nominal inverse kinematics of the robot's tool. Of several solutions those that
+/// the target's words (turn, quadrants, then cfx) name; of what remains the nearest to the command before, at first to `start`.
+/// `frame` is F0 as seen from the frame of the program's poses.
+/// \throws InputError  path:line: name: a pose that is not reached as its words say; several solutions without `start`
+TargetsFile program_commands(const TargetProgram& program, const Robot& robot, const Pose<double>& frame,
+                             const std::optional<std::array<double, joint_count>>& start,
+                             const std::function<void(std::size_t done, std::size_t of)>& progress);
+
+/// The program with these commands for its targets: a pose becomes the one to which they bring the nominal kinematics.
+std::string with_commands(const TargetProgram& program, const Robot& robot, const Pose<double>& frame,
+                          const std::vector<std::array<double, joint_count>>& q_rad);
 
 }  // namespace flexcomp::host
 

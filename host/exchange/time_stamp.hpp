@@ -5,7 +5,6 @@
 #define FLEXCOMP_HOST_EXCHANGE_TIME_STAMP_HPP
 
 #include <optional>
-#include <string>
 #include <string_view>
 
 #include "units.hpp"

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "files/calibration_file.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <map>
 #include <stdexcept>
 
 #include "files/write_file.hpp"
 #include "files/yaml_field.hpp"
-#include "files/yaml_text.hpp"
 #include "model/covariate.hpp"
 #include "model/effects.hpp"
 #include "model/place.hpp"
@@ -27,6 +24,99 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t link_slot_count = 5;  // gamma has no constant part
+
+// --- selectors of effects, both ways ------------------------------------------------------------------------------
+
+std::string number(double si, const Unit& unit) { return yaml_number(si, unit); }
+
+std::string list_text(const std::vector<std::string>& items) {
+  return fmt::format("[{}]", fmt::join(items, ", "));
+}
+
+/// A key that tells two effects of one name apart.
+struct SelectorKey {
+  Selector selector;
+  const char* key;
+  bool optional;
+  void (*read)(const YamlField& field, EffectId& id);
+  std::string (*text)(const EffectId& id);  ///< empty where the key is left out
+};
+
+template <unsigned EffectId::*member>
+SelectorKey counted(Selector selector, const char* key) {
+  return {selector, key, false,
+          [](const YamlField& field, EffectId& id) { id.*member = field.integer(1, joint_count); },
+          [](const EffectId& id) { return id.*member == 0 ? "" : fmt::format("{}", id.*member); }};
+}
+
+void read_covariates(const YamlField& of, EffectId& id) {
+  const auto names = of.items();
+  if (names.size() != 2) throw of.error("two covariates such as [q2, payload_kg]");
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto covariate = covariate_of(names[side].text());
+    if (!covariate)
+      throw names[side].error("one of q1 … q6, payload_kg, temp_c, time_s, dir1 … dir6, speed1 … speed6");
+    std::tie(id.covariate[side], id.covariate_joint[side]) = *covariate;
+  }
+}
+
+std::string covariates_text(const EffectId& id) {
+  return list_text({covariate_name(id.covariate[0], id.covariate_joint[0]),
+                    covariate_name(id.covariate[1], id.covariate_joint[1])});
+}
+
+void read_nodes(const YamlField& grid, EffectId& id) {
+  const auto sides = grid.items();
+  if (sides.size() != 2) throw grid.error("two lists of nodes");
+  for (std::size_t side = 0; side < 2; ++side) {
+    for (const YamlField& node : sides[side].items())
+      id.node[side].push_back(node.number(covariate_unit(id.covariate[side])));
+  }
+}
+
+std::string nodes_text(const EffectId& id) {
+  std::vector<std::string> sides;
+  for (std::size_t side = 0; side < 2; ++side) {
+    std::vector<std::string> nodes;
+    for (const double v : id.node[side]) nodes.push_back(number(v, covariate_unit(id.covariate[side])));
+    sides.push_back(list_text(nodes));
+  }
+  return list_text(sides);
+}
+
+/// Keys of one selector in the order in which they are read: `grid` needs the covariates. Selector::size has none.
+const std::vector<SelectorKey>& selector_keys() {
+  static const std::vector<SelectorKey> all{
+      counted<&EffectId::joint>(Selector::joint, "joint"),
+      counted<&EffectId::from>(Selector::from, "from"),
+      counted<&EffectId::link>(Selector::link, "link"),
+      {Selector::order, "order", false,
+       [](const YamlField& field, EffectId& id) { id.order = field.number(unit::si, 0, "an order above 0"); },
+       [](const EffectId& id) { return number(id.order, unit::si); }},
+      {Selector::pivot, "pivot_z_mm", true,
+       [](const YamlField& field, EffectId& id) { id.pivot_z_m = field.number(unit::mm); },
+       [](const EffectId& id) { return number(id.pivot_z_m, unit::mm); }},
+      {Selector::after, "after_s", false,
+       [](const YamlField& field, EffectId& id) { id.after_s = field.number(unit::si); },
+       [](const EffectId& id) { return number(id.after_s, unit::si); }},
+      {Selector::factor, "factor", true,
+       [](const YamlField& field, EffectId& id) {
+         const auto factor = factor_of(field.text());
+         if (!factor) throw field.error("one of load_torque, temperature, payload");
+         id.factor = *factor;
+       },
+       [](const EffectId& id) { return factor_name(id.factor); }},
+      {Selector::place, "place", false,
+       [](const YamlField& field, EffectId& id) {
+         const auto place = place_of(field.text());
+         if (!place) throw field.error("a place such as link3.theta");
+         id.place = *place;
+       },
+       [](const EffectId& id) { return place_name(id.place); }},
+      {Selector::grid, "of", false, read_covariates, covariates_text},
+      {Selector::grid, "grid", false, read_nodes, nodes_text}};
+  return all;
+}
 
 // --- reading ------------------------------------------------------------------------------------------------------
 
@@ -69,12 +159,9 @@ class SetReader {
     const YamlField name_field = entry.at("effect");
     const std::string effect_text = name_field.text();
     const auto effect = effect_of(effect_text);
-    if (!effect) {
-      const std::string near = nearest(effect_text, effect_names());
-      throw name_field.error(near.empty()
-                                 ? fmt::format("one of {}", fmt::join(effect_names(), ", "))
-                                 : fmt::format("an effect of the catalogue (did you mean '{}'?)", near));
-    }
+    if (!effect)
+      throw name_field.error(
+          expected_name(effect_text, effect_names(), "one of", "an effect of the catalogue"));
     std::vector<std::string> selectors{"effect"};
     const EffectId id = identity(entry, *effect, selectors);
     if (const auto wrong = validation_error(id, robot_.nominal)) throw entry.error(*wrong, name(id));
@@ -142,80 +229,16 @@ class SetReader {
     EffectId id;
     id.effect = effect;
     const EffectDescriptor& d = descriptor(effect);
-    const auto number = [&](const char* key) {
-      selectors.emplace_back(key);
-      return entry.at(key).integer(1, joint_count);
-    };
     for (const Selector s : d.selectors) {
-      switch (s) {
-        case Selector::joint:
-          id.joint = number("joint");
-          break;
-        case Selector::from:
-          id.from = number("from");
-          break;
-        case Selector::link:
-          if (d.all_links_by_default && !entry.has("link")) {
-            selectors.emplace_back("link");
-          } else {
-            id.link = number("link");
-          }
-          break;
-        case Selector::order:
-          selectors.emplace_back("order");
-          id.order = entry.at("order").number(unit::si, 0, "an order above 0");
-          break;
-        case Selector::size:
-          id.coefficients = entry.at("coefficients_rad").items().size();
-          break;
-        case Selector::factor:
-          selectors.emplace_back("factor");
-          if (const auto field = entry.find("factor")) {
-            const auto factor = factor_of(field->text());
-            if (!factor) throw field->error("one of load_torque, temperature, payload");
-            id.factor = *factor;
-          }
-          break;
-        case Selector::pivot:
-          selectors.emplace_back("pivot_z_mm");
-          id.pivot_z_m = entry.number_or("pivot_z_mm", unit::mm, 0);
-          break;
-        case Selector::after:
-          selectors.emplace_back("after_s");
-          id.after_s = entry.at("after_s").number(unit::si);
-          break;
-        case Selector::place: {
-          selectors.emplace_back("place");
-          const YamlField field = entry.at("place");
-          const auto place = place_of(field.text());
-          if (!place) throw field.error("a place such as link3.theta");
-          id.place = *place;
-          break;
-        }
-        case Selector::grid:
-          selectors.insert(selectors.end(), {"of", "grid"});
-          read_grid(entry, id);
-          break;
+      if (s == Selector::size) id.coefficients = entry.at("coefficients_rad").items().size();
+      for (const SelectorKey& k : selector_keys()) {
+        if (k.selector != s) continue;
+        selectors.emplace_back(k.key);
+        const bool optional = k.optional || (s == Selector::link && d.all_links_by_default);
+        if (!optional || entry.has(k.key)) k.read(entry.at(k.key), id);
       }
     }
     return id;
-  }
-
-  static void read_grid(const YamlField& entry, EffectId& id) {
-    const YamlField of = entry.at("of");
-    const YamlField grid = entry.at("grid");
-    const auto names = of.items();
-    const auto sides = grid.items();
-    if (names.size() != 2) throw of.error("two covariates such as [q2, payload_kg]");
-    if (sides.size() != 2) throw grid.error("two lists of nodes");
-    for (std::size_t side = 0; side < 2; ++side) {
-      const auto covariate = covariate_of(names[side].text());
-      if (!covariate)
-        throw names[side].error("one of q1 … q6, payload_kg, temp_c, time_s, dir1 … dir6, speed1 … speed6");
-      std::tie(id.covariate[side], id.covariate_joint[side]) = *covariate;
-      for (const YamlField& node : sides[side].items())
-        id.node[side].push_back(node.number(covariate_unit(covariate->first)));
-    }
   }
 
   /// Numbers of a curve (a list) or a grid (a list of rows).
@@ -357,8 +380,6 @@ void read_head(const YamlField& root, const Robot& robot, Calibration& c) {
 
 // --- writing ------------------------------------------------------------------------------------------------------
 
-std::string number(double si, const Unit& unit) { return yaml_number(si, unit); }
-
 /// Uncertainties are known to few digits.
 std::string sigma_number(double si, const Unit& unit) {
   return yaml_number(fmt::format("{:.6g}", si / unit.si_per_file_unit()));
@@ -396,10 +417,6 @@ std::vector<std::string> constants_text(const Calibration& c, std::uint8_t body)
   return parts;
 }
 
-std::string list_text(const std::vector<std::string>& items) {
-  return fmt::format("[{}]", fmt::join(items, ", "));
-}
-
 /// Numbers of a curve as a list, of a grid as a list of rows.
 std::string values_text(const EffectId& id, const std::vector<std::string>& values) {
   if (descriptor(id.effect).table == TableKind::curve) return list_text(values);
@@ -413,46 +430,9 @@ std::string values_text(const EffectId& id, const std::vector<std::string>& valu
 std::vector<std::string> selectors_text(const EffectId& id) {
   std::vector<std::string> parts{"effect: " + effect_name(id.effect)};
   for (const Selector s : descriptor(id.effect).selectors) {
-    switch (s) {
-      case Selector::joint:
-        parts.push_back(fmt::format("joint: {}", id.joint));
-        break;
-      case Selector::from:
-        parts.push_back(fmt::format("from: {}", id.from));
-        break;
-      case Selector::link:
-        if (id.link != 0) parts.push_back(fmt::format("link: {}", id.link));
-        break;
-      case Selector::order:
-        parts.push_back("order: " + number(id.order, unit::si));
-        break;
-      case Selector::pivot:
-        parts.push_back("pivot_z_mm: " + number(id.pivot_z_m, unit::mm));
-        break;
-      case Selector::after:
-        parts.push_back("after_s: " + number(id.after_s, unit::si));
-        break;
-      case Selector::factor:
-        if (id.factor != Factor::one) parts.push_back("factor: " + factor_name(id.factor));
-        break;
-      case Selector::place:
-        parts.push_back("place: " + place_name(id.place));
-        break;
-      case Selector::grid: {
-        std::vector<std::string> names;
-        std::vector<std::string> sides;
-        for (std::size_t side = 0; side < 2; ++side) {
-          names.push_back(covariate_name(id.covariate[side], id.covariate_joint[side]));
-          std::vector<std::string> nodes;
-          for (const double v : id.node[side]) nodes.push_back(number(v, covariate_unit(id.covariate[side])));
-          sides.push_back(list_text(nodes));
-        }
-        parts.push_back("of: " + list_text(names));
-        parts.push_back("grid: " + list_text(sides));
-        break;
-      }
-      case Selector::size:
-        break;
+    for (const SelectorKey& k : selector_keys()) {
+      const std::string text = k.selector == s ? k.text(id) : "";
+      if (!text.empty()) parts.push_back(fmt::format("{}: {}", k.key, text));
     }
   }
   return parts;

@@ -2,7 +2,6 @@
 #include "files/capsule.hpp"
 
 #include "files/yaml_field.hpp"
-#include "model/robot.hpp"
 
 namespace flexcomp::host {
 

@@ -4,7 +4,7 @@
 #ifndef FLEXCOMP_HOST_FILES_CAPSULE_HPP
 #define FLEXCOMP_HOST_FILES_CAPSULE_HPP
 
-#include "model/capsule.hpp"
+#include "model/robot.hpp"
 
 namespace flexcomp::host {
 

@@ -3,7 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <algorithm>
+#include <utility>
 
 #include "files/read_file.hpp"
 #include "files/text.hpp"
@@ -20,8 +21,9 @@ std::vector<std::string> split(std::string_view line, const std::string& path, s
   std::size_t at = 0;
   for (;;) {
     const std::size_t start = line.find_first_not_of(" \t", at);
-    if (start != std::string_view::npos && line[start] == '"') {
-      std::string cell;
+    const bool quoted = start != std::string_view::npos && line[start] == '"';
+    std::string cell;
+    if (quoted) {
       at = start + 1;
       for (;; ++at) {
         if (at >= line.size())
@@ -35,20 +37,14 @@ std::vector<std::string> split(std::string_view line, const std::string& path, s
           break;
         }
       }
-      const std::size_t comma = line.find(',', at);
-      const std::string_view rest =
-          trimmed(line.substr(at, comma == std::string_view::npos ? comma : comma - at));
-      if (!rest.empty())
-        throw InputError(path, number, "", "a comma after a quoted cell", fmt::format("'{}'", rest));
-      cells.push_back(std::move(cell));
-      if (comma == std::string_view::npos) return cells;
-      at = comma + 1;
-    } else {
-      const std::size_t comma = line.find(',', at);
-      cells.emplace_back(trimmed(line.substr(at, comma == std::string_view::npos ? comma : comma - at)));
-      if (comma == std::string_view::npos) return cells;
-      at = comma + 1;
     }
+    const std::size_t comma = std::min(line.find(',', at), line.size());
+    const std::string_view rest = trimmed(line.substr(at, comma - at));
+    if (quoted && !rest.empty())
+      throw InputError(path, number, "", "a comma after a quoted cell", fmt::format("'{}'", rest));
+    cells.push_back(quoted ? std::move(cell) : std::string(rest));
+    if (comma == line.size()) return cells;
+    at = comma + 1;
   }
 }
 

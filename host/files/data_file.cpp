@@ -20,7 +20,6 @@ namespace flexcomp::host {
 
 namespace {
 
-using Column = std::optional<std::size_t>;
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 constexpr std::array<const char*, 4> quaternion_names{"qw", "qx", "qy", "qz"};
 constexpr std::array<const char*, 4> reflector_names{"a", "b", "c", "d"};
@@ -65,31 +64,65 @@ bool is_known(const std::string& name) {
   return std::find(known_names().begin(), known_names().end(), name) != known_names().end();
 }
 
+/// Calls visit(name, unit, is there, value) for each context column, in the order of files.
+template <class Columns, class Row, class Visit>
+void each_context_column(Columns& columns, Row&& row, const Visit& visit) {
+  auto& context = row.context;
+  visit("payload_kg", unit::si, columns.payload_mass, context.payload_kg);
+  for (std::size_t k = 0; k < 3; ++k)
+    visit(com_name(k), unit::mm, columns.payload_com[k], context.payload_com_m[k]);
+  for (std::size_t j = 0; j < joint_count; ++j)
+    visit(move_name(j), unit::degree, columns.move[j], row.move_rad[j]);
+  for (std::size_t j = 0; j < joint_count; ++j)
+    visit(direction_name(j), unit::si, columns.direction[j], context.direction[j]);
+  visit("temp_c", unit::si, columns.temperature, context.temperature_c);
+  visit("time_s", unit::si, columns.time, context.time_s);
+  for (std::size_t k = 0; k < 3; ++k) visit(force_name(k), unit::si, columns.force[k], context.force_n[k]);
+}
+
+/// The same for the standard deviations of what was measured.
+template <class Columns, class Row, class Visit>
+void each_sigma_column(Columns& columns, Row&& row, const Visit& visit) {
+  visit("sigma_mm", unit::mm, columns.position_sigma, row.position_sigma_m);
+  visit("sigma_deg", unit::degree, columns.orientation_sigma, row.orientation_sigma_rad);
+}
+
+/// The same for what was measured, all of which is there.
+template <class Visit>
+void each_measured_column(const MeasuredData& data, const Measurement& row, const Visit& visit) {
+  if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
+    for (std::size_t k = 0; k < 3; ++k)
+      visit(position_name(k), unit::mm, true, row.position_m[static_cast<Eigen::Index>(k)]);
+  }
+  if (data.kind == MeasurementKind::pose) {
+    const Eigen::Quaterniond& q = row.orientation;
+    const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
+    for (std::size_t k = 0; k < 4; ++k) visit(quaternion_names[k], unit::si, true, wxyz[k]);
+  }
+  for (std::size_t r = 0; r < data.reflectors; ++r) {
+    for (std::size_t k = 0; k < 3; ++k)
+      visit(point_name(r, k), unit::mm, true, row.reflector_m[r][static_cast<Eigen::Index>(k)]);
+  }
+}
+
 /// Reads the columns common to data files and targets, and records which ones were used.
 class ColumnReader {
  public:
   ColumnReader(CsvTable table, const Robot& robot)
       : table_(std::move(table)), robot_(robot), used_(table_.header.size()) {
-    payload_ = use("payload_kg");
-    temperature_ = use("temp_c");
-    time_ = use("time_s");
-    position_sigma_ = use("sigma_mm");
-    orientation_sigma_ = use("sigma_deg");
-    for (std::size_t k = 0; k < 3; ++k) {
-      com_[k] = use(com_name(k));
-      force_[k] = use(force_name(k));
-    }
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      move_[j] = use(move_name(j));
-      direction_[j] = use(direction_name(j));
-    }
+    Measurement row;
+    const auto look = [this](const std::string& name, const Unit&, bool& there, double&) {
+      there = use(name).has_value();
+    };
+    each_context_column(columns_, row, look);
+    each_sigma_column(columns_, row, look);
   }
 
   const CsvTable& table() const { return table_; }
   bool has(const std::string& name) const { return table_.has(name); }
 
-  Column use(const std::string& name) {
-    const Column column = table_.find(name);
+  std::optional<std::size_t> use(const std::string& name) {
+    const auto column = table_.find(name);
     if (column) used_[*column] = true;
     return column;
   }
@@ -112,46 +145,27 @@ class ColumnReader {
   double number(const CsvRow& row, std::size_t column, const Unit& unit) const {
     return table_.number(row, column, unit);
   }
-  InputError error(const CsvRow& row, std::size_t column, const std::string& expected,
-                   const std::string& note = "") const {
-    return {table_.path, row.line, table_.header[column], expected, "'" + row.cells[column] + "'" + note};
+  InputError error(const CsvRow& row, const std::string& column, const std::string& expected) const {
+    return {table_.path, row.line, column, expected, "'" + row.cells[*table_.find(column)] + "'"};
   }
 
-  ContextColumns columns() const {
-    ContextColumns c;
-    c.payload_mass = payload_.has_value();
-    c.temperature = temperature_.has_value();
-    c.time = time_.has_value();
-    c.position_sigma = position_sigma_.has_value();
-    c.orientation_sigma = orientation_sigma_.has_value();
-    for (std::size_t k = 0; k < 3; ++k) {
-      c.payload_com[k] = com_[k].has_value();
-      c.force[k] = force_[k].has_value();
-    }
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      c.move[j] = move_[j].has_value();
-      c.direction[j] = direction_[j].has_value();
-    }
-    return c;
-  }
+  const ContextColumns& columns() const { return columns_; }
 
   /// Context, motion and sigma of a row.
   void read_context(const CsvRow& row, Measurement& m) const {
     m.context = default_context<double>(robot_.nominal);
     m.position_sigma_m = robot_.position_sigma_m;
     m.orientation_sigma_rad = robot_.orientation_sigma_rad;
-    if (payload_) {
-      m.context.payload_kg = number(row, *payload_, unit::si);
-      if (m.context.payload_kg < 0) throw error(row, *payload_, "a mass of 0 or more");
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (com_[k]) m.context.payload_com_m[k] = number(row, *com_[k], unit::mm);
-      if (force_[k]) m.context.force_n[k] = number(row, *force_[k], unit::si);
-    }
-    if (temperature_) m.context.temperature_c = number(row, *temperature_, unit::si);
-    if (time_) m.context.time_s = number(row, *time_, unit::si);
-    if (position_sigma_) m.position_sigma_m = positive(row, *position_sigma_, unit::mm);
-    if (orientation_sigma_) m.orientation_sigma_rad = positive(row, *orientation_sigma_, unit::degree);
+    each_context_column(columns_, m,
+                        [&](const std::string& name, const Unit& unit, bool there, double& value) {
+                          if (there) value = number(row, *table_.find(name), unit);
+                        });
+    if (m.context.payload_kg < 0) throw error(row, "payload_kg", "a mass of 0 or more");
+    each_sigma_column(columns_, m, [&](const char* name, const Unit& unit, bool there, double& value) {
+      if (!there) return;
+      value = number(row, *table_.find(name), unit);
+      if (!(value > 0)) throw error(row, name, "a standard deviation above 0");
+    });
     read_motion(row, m);
   }
 
@@ -162,7 +176,7 @@ class ColumnReader {
       const JointLimits& limits = robot_.nominal.limits[j];
       if (within_limits && (q_rad[j] < limits.min_rad - limit_tolerance_rad ||
                             q_rad[j] > limits.max_rad + limit_tolerance_rad)) {
-        throw error(row, columns[j],
+        throw error(row, table_.header[columns[j]],
                     fmt::format("a reading within the limits of joint {} in {} ({:.6g} to {:.6g} deg)", j + 1,
                                 robot_.path, degrees(limits.min_rad), degrees(limits.max_rad)));
       }
@@ -173,9 +187,7 @@ class ColumnReader {
     std::array<double, 4> wxyz{};
     for (std::size_t k = 0; k < 4; ++k) wxyz[k] = number(row, columns[k], unit::si);
     if (const auto q = unit_quaternion(wxyz)) return *q;
-    throw InputError(
-        table_.path, row.line, "qw qx qy qz", "a quaternion of norm 1 (within 0.001)",
-        fmt::format("norm {:.6g}", Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm()));
+    throw InputError(table_.path, row.line, "qw qx qy qz", unit_quaternion_rule, norm_text(wxyz));
   }
 
   /// Refuses readings in radians under names in degrees: all below 7.
@@ -212,43 +224,29 @@ class ColumnReader {
   }
 
  private:
-  double positive(const CsvRow& row, std::size_t column, const Unit& unit) const {
-    const double value = number(row, column, unit);
-    if (!(value > 0)) throw error(row, column, "a standard deviation above 0");
-    return value;
-  }
-
   void read_motion(const CsvRow& row, Measurement& m) const {
     double largest = 0;
-    bool all = true;
     for (std::size_t j = 0; j < joint_count; ++j) {
-      if (direction_[j]) {
-        const double d = number(row, *direction_[j], unit::si);
-        if (d != -1 && d != 0 && d != 1) throw error(row, *direction_[j], "-1, 0 (unknown) or 1");
-        m.context.direction[j] = d;
-      }
-      all = all && move_[j];
-      if (!move_[j]) continue;
-      m.move_rad[j] = number(row, *move_[j], unit::degree);
+      double& d = m.context.direction[j];
+      if (d != -1 && d != 0 && d != 1) throw error(row, direction_name(j), "-1, 0 (unknown) or 1");
+      if (!columns_.move[j]) continue;
       const double sign = m.move_rad[j] > 0 ? 1 : m.move_rad[j] < 0 ? -1 : 0;
-      if (direction_[j] && m.context.direction[j] != 0 && m.context.direction[j] != sign) {
-        throw error(row, *direction_[j],
-                    fmt::format("the sign of {} ({})", move_name(j), row.cells[*move_[j]]));
+      if (d != 0 && d != sign) {
+        const std::string& move = row.cells[*table_.find(move_name(j))];
+        throw error(row, direction_name(j), fmt::format("the sign of {} ({})", move_name(j), move));
       }
-      m.context.direction[j] = sign;
+      d = sign;
       largest = std::max(largest, std::abs(m.move_rad[j]));
     }
     // The speed relative to the fastest joint needs the motion of every joint.
-    if (!all || largest == 0) return;
+    if (!columns_.all_moves() || largest == 0) return;
     for (std::size_t j = 0; j < joint_count; ++j) m.context.relative_speed[j] = m.move_rad[j] / largest;
   }
 
   CsvTable table_;
   const Robot& robot_;
   std::vector<bool> used_;
-  Column payload_, temperature_, time_, position_sigma_, orientation_sigma_;
-  std::array<Column, 3> com_, force_;
-  std::array<Column, joint_count> move_, direction_;
+  ContextColumns columns_;
 };
 
 /// Measured columns of a file.
@@ -395,75 +393,38 @@ const std::vector<std::string>& context_names() {
 std::vector<std::string> joint_and_context_names(const ContextColumns& columns) {
   std::vector<std::string> names;
   for (std::size_t j = 0; j < joint_count; ++j) names.push_back(joint_name(j));
-  if (columns.payload_mass) names.emplace_back("payload_kg");
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (columns.payload_com[k]) names.push_back(com_name(k));
-  }
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    if (columns.move[j]) names.push_back(move_name(j));
-  }
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    if (columns.direction[j]) names.push_back(direction_name(j));
-  }
-  if (columns.temperature) names.emplace_back("temp_c");
-  if (columns.time) names.emplace_back("time_s");
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (columns.force[k]) names.push_back(force_name(k));
-  }
+  each_context_column(columns, Measurement(), [&](const std::string& name, const Unit&, bool there, double) {
+    if (there) names.push_back(name);
+  });
   return names;
 }
 
 std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, const Measurement& row) {
-  const Context<double, joint_count>& c = row.context;
   std::vector<std::string> cells;
   for (const double q : row.q_rad) cells.push_back(format_si(q, unit::degree));
-  if (columns.payload_mass) cells.push_back(format_si(c.payload_kg, unit::si));
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (columns.payload_com[k]) cells.push_back(format_si(c.payload_com_m[k], unit::mm));
-  }
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    if (columns.move[j]) cells.push_back(format_si(row.move_rad[j], unit::degree));
-  }
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    if (columns.direction[j]) cells.push_back(format_si(c.direction[j], unit::si));
-  }
-  if (columns.temperature) cells.push_back(format_si(c.temperature_c, unit::si));
-  if (columns.time) cells.push_back(format_si(c.time_s, unit::si));
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (columns.force[k]) cells.push_back(format_si(c.force_n[k], unit::si));
-  }
+  each_context_column(columns, row, [&](const std::string&, const Unit& unit, bool there, double value) {
+    if (there) cells.push_back(format_si(value, unit));
+  });
   return cells;
 }
 
 std::string data_text(const MeasuredData& data) {
   std::vector<std::string> names = joint_and_context_names(data.columns);
-  if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
-    for (std::size_t k = 0; k < 3; ++k) names.push_back(position_name(k));
-  }
-  if (data.kind == MeasurementKind::pose)
-    names.insert(names.end(), quaternion_names.begin(), quaternion_names.end());
-  for (std::size_t r = 0; r < data.reflectors; ++r) {
-    for (std::size_t k = 0; k < 3; ++k) names.push_back(point_name(r, k));
-  }
-  if (data.columns.position_sigma) names.emplace_back("sigma_mm");
-  if (data.columns.orientation_sigma) names.emplace_back("sigma_deg");
+  const auto add_name = [&names](const std::string& name, const Unit&, bool there, double) {
+    if (there) names.push_back(name);
+  };
+  each_measured_column(data, Measurement(), add_name);
+  each_sigma_column(data.columns, Measurement(), add_name);
   for (const std::string& name : data.extra) names.push_back(csv_cell(name));
 
   std::string text = joined(names);
   for (const Measurement& row : data.rows) {
     std::vector<std::string> cells = joint_and_context_cells(data.columns, row);
-    if (data.kind == MeasurementKind::position || data.kind == MeasurementKind::pose) {
-      for (const double v : row.position_m) cells.push_back(format_si(v, unit::mm));
-    }
-    if (data.kind == MeasurementKind::pose) {
-      const Eigen::Quaterniond& q = row.orientation;
-      for (const double v : {q.w(), q.x(), q.y(), q.z()}) cells.push_back(format_si(v, unit::si));
-    }
-    for (std::size_t r = 0; r < data.reflectors; ++r) {
-      for (const double v : row.reflector_m[r]) cells.push_back(format_si(v, unit::mm));
-    }
-    if (data.columns.position_sigma) cells.push_back(format_si(row.position_sigma_m, unit::mm));
-    if (data.columns.orientation_sigma) cells.push_back(format_si(row.orientation_sigma_rad, unit::degree));
+    const auto add_cell = [&cells](const std::string&, const Unit& unit, bool there, double value) {
+      if (there) cells.push_back(format_si(value, unit));
+    };
+    each_measured_column(data, row, add_cell);
+    each_sigma_column(data.columns, row, add_cell);
     for (const std::string& cell : row.extra) cells.push_back(csv_cell(cell));
     text += joined(cells);
   }

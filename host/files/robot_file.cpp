@@ -9,7 +9,6 @@
 
 #include "files/capsule.hpp"
 #include "files/yaml_field.hpp"
-#include "files/yaml_text.hpp"
 
 namespace flexcomp::host {
 

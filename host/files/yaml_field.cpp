@@ -75,10 +75,8 @@ void YamlField::require_keys(const std::vector<std::string>& known) const {
     const std::string field = path_.empty() ? key : path_ + "." + key;
     const std::size_t line = line_of(pair.first.Mark());
     if (std::find(known.begin(), known.end(), key) == known.end()) {
-      const std::string near = nearest(key, known);
-      std::string expected = near.empty() ? "one of the keys " : "a known key (did you mean '" + near + "'?)";
-      if (near.empty()) expected += fmt::format("{}", fmt::join(known, ", "));
-      throw InputError(file_, line, field, expected, "the unknown key '" + key + "'");
+      throw InputError(file_, line, field, expected_name(key, known, "one of the keys", "a known key"),
+                       "the unknown key '" + key + "'");
     }
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
       throw InputError(file_, line, field, "each key once", "'" + key + "' a second time");
@@ -154,17 +152,27 @@ Eigen::Quaterniond YamlField::quaternion() const {
   const std::vector<YamlField> parts = items();
   const std::array<double, 4> wxyz{parts[0].number(unit::si), parts[1].number(unit::si),
                                    parts[2].number(unit::si), parts[3].number(unit::si)};
-  const auto q = unit_quaternion(wxyz);
-  if (!q) {
-    const double norm = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).norm();
-    throw error("a quaternion w x y z of norm 1 (within 0.001)", fmt::format("norm {:.6g}", norm));
-  }
-  return *q;
+  if (const auto q = unit_quaternion(wxyz)) return *q;
+  throw error("a quaternion w x y z of norm 1 (within 0.001)", norm_text(wxyz));
 }
 
 double YamlField::number_or(const std::string& key, const Unit& unit, double otherwise) const {
   const auto field = find(key);
   return field ? field->number(unit) : otherwise;
+}
+
+std::string yaml_number(std::string text) {
+  const std::size_t e = text.find('e');
+  if (e != std::string::npos && text.find('.') == std::string::npos) text.insert(e, ".0");
+  return text;
+}
+
+std::string yaml_number(double si, const Unit& unit) { return yaml_number(format_si(si, unit)); }
+
+std::string yaml_quoted(const std::string& text) {
+  YAML::Emitter emitter;
+  emitter << YAML::DoubleQuoted << text;
+  return emitter.c_str();
 }
 
 }  // namespace flexcomp::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A YAML node with its file, line and field path for error messages.
+/// YAML: a node with its file, line and field path for error messages; numbers and strings as text.
 #ifndef FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
 #define FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
 
@@ -64,6 +64,14 @@ class YamlField {
   std::string path_;
   std::size_t line_;
 };
+
+/// Formats a number for YAML 1.1 readers, to which 1e-05 is text and 1.0e-05 a number.
+std::string yaml_number(std::string text);
+/// Formats a number with the digits from which the identical double is read back.
+std::string yaml_number(double si, const Unit& unit);
+
+/// Quotes a text with double quotes and escapes.
+std::string yaml_quoted(const std::string& text);
 
 }  // namespace flexcomp::host
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -46,7 +47,10 @@ struct ContextColumns {
   bool orientation_sigma = false;
   std::array<bool, 3> force{};
 
-  bool all_moves() const;  ///< relative speeds are known
+  /// Relative speeds are known.
+  bool all_moves() const {
+    return std::all_of(move.begin(), move.end(), [](bool b) { return b; });
+  }
 };
 
 /// Rows of one file.

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "model/capsule.hpp"
+#include "model/robot.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <memory>
 #include <stdexcept>
 
 #include "flexcomp/image.hpp"

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "flexcomp/status.hpp"
 #include "model/calibration.hpp"
 #include "model/robot.hpp"
 

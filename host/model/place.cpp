@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "flexcomp/robot.hpp"
 #include "model/robot.hpp"
 
 namespace flexcomp::host {

@@ -11,11 +11,18 @@
 #include <vector>
 
 #include "flexcomp/robot.hpp"
-#include "model/capsule.hpp"
 
 namespace flexcomp::host {
 
 constexpr std::size_t joint_count = 6;
+
+/// A body for collision and beam: all points within radius_m of a segment (of a point, where both ends are the same).
+struct Capsule {
+  std::size_t frame = 0;  ///< 0: F0; i: the frame after link i
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0;
+};
 
 struct Robot {
   std::string path;  ///< as it was given, for messages

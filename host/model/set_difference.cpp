@@ -3,9 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <map>
-#include <memory>
 #include <random>
 
 #include "flexcomp/forward.hpp"
@@ -14,17 +12,10 @@
 
 namespace flexcomp::host {
 
-namespace {
-
-struct Place {
-  std::array<double, joint_count> q_rad{};
-  Context<double, joint_count> context;
-};
-
-std::vector<Place> places(const Robot& robot, std::size_t count) {
+std::vector<RandomPlace> random_places(const Robot& robot, std::size_t count) {
   std::mt19937_64 random(1);
-  std::vector<Place> out(count);
-  for (Place& p : out) {
+  std::vector<RandomPlace> out(count);
+  for (RandomPlace& p : out) {
     p.context = default_context<double>(robot.nominal);
     for (std::size_t j = 0; j < joint_count; ++j) {
       const JointLimits& l = robot.nominal.limits[j];
@@ -35,16 +26,17 @@ std::vector<Place> places(const Robot& robot, std::size_t count) {
   return out;
 }
 
-std::vector<Pose<double>> poses_of(const TermSet& set, const Robot& robot, const std::vector<Place>& at) {
-  const auto model = prepare(set, robot, "");
+std::vector<Pose<double>> poses_of(const TermSet& set, const Robot& robot, const std::vector<RandomPlace>& at,
+                                   const std::string& source) {
+  const auto model = prepare(set, robot, source);
   Workspace<double, joint_count> workspace;
   std::vector<Pose<double>> out;
   out.reserve(at.size());
-  for (const Place& p : at) out.push_back(forward(*model, p.q_rad, p.context, workspace));
+  for (const RandomPlace& p : at) out.push_back(forward(*model, p.q_rad, p.context, workspace));
   return out;
 }
 
-ToolShift shift(const std::vector<Pose<double>>& from, const std::vector<Pose<double>>& to) {
+ToolShift tool_shift(const std::vector<Pose<double>>& from, const std::vector<Pose<double>>& to) {
   ToolShift out;
   for (std::size_t k = 0; k < from.size(); ++k) {
     const double moved = (to[k].position - from[k].position).norm();
@@ -56,15 +48,13 @@ ToolShift shift(const std::vector<Pose<double>>& from, const std::vector<Pose<do
   return out;
 }
 
-}  // namespace
-
 SetDifference difference(const TermSet& before, const TermSet& after, const Robot& robot, std::size_t poses) {
-  const std::vector<Place> at = places(robot, poses);
+  const std::vector<RandomPlace> at = random_places(robot, poses);
   const std::vector<Pose<double>> from = poses_of(before, robot, at);
   const std::vector<Pose<double>> to = poses_of(after, robot, at);
   SetDifference out;
   out.poses = poses;
-  out.at_tool = shift(from, to);
+  out.at_tool = tool_shift(from, to);
   std::map<std::string, Parameter> old;
   for (const Parameter& p : parameters_of(before, robot.nominal)) old.emplace(p.name, p);
   for (const Parameter& p : parameters_of(after, robot.nominal)) {
@@ -79,7 +69,7 @@ SetDifference difference(const TermSet& before, const TermSet& after, const Robo
     }
     TermSet without = after;
     p.set(without, change.before);
-    change.at_tool = shift(poses_of(without, robot, at), to);
+    change.at_tool = tool_shift(poses_of(without, robot, at), to);
     out.changes.push_back(std::move(change));
   }
   for (const Parameter& p : parameters_of(before, robot.nominal)) {
@@ -91,9 +81,28 @@ SetDifference difference(const TermSet& before, const TermSet& after, const Robo
     }
     TermSet without = before;
     p.set(without, 0);
-    out.changes.push_back({p.name, p.unit, value, 0, shift(from, poses_of(without, robot, at))});
+    out.changes.push_back({p.name, p.unit, value, 0, tool_shift(from, poses_of(without, robot, at))});
   }
   return out;
+}
+
+Json to_json(const SetDifference& d) {
+  Json result;
+  result["unchanged"] = d.unchanged;
+  result["tool"] = {{"mean_mm", d.at_tool.mean_m * 1e3},
+                    {"largest_mm", d.at_tool.largest_m * 1e3},
+                    {"largest_deg", degrees(d.at_tool.largest_rad)},
+                    {"poses", d.poses}};
+  result["parameters"] = Json::array();
+  for (const ParameterChange& c : d.changes) {
+    result["parameters"].push_back({{"name", c.name},
+                                    {"old", c.before / c.unit.si_per_file_unit()},
+                                    {"new", c.after / c.unit.si_per_file_unit()},
+                                    {"unit", c.unit.name},
+                                    {"tool_mm", c.at_tool.largest_m * 1e3},
+                                    {"tool_deg", degrees(c.at_tool.largest_rad)}});
+  }
+  return result;
 }
 
 }  // namespace flexcomp::host

@@ -4,10 +4,14 @@
 #ifndef FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_HPP
 #define FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_HPP
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
 
+#include "flexcomp/linear.hpp"
+#include "flexcomp/robot.hpp"
+#include "json.hpp"
 #include "model/robot.hpp"
 #include "model/term_set.hpp"
 #include "units.hpp"
@@ -19,6 +23,21 @@ struct ToolShift {
   double mean_m = 0;
   double largest_rad = 0;
 };
+
+/// Joint readings inside the limits, at which each joint came from one side or the other; else the default context.
+struct RandomPlace {
+  std::array<double, joint_count> q_rad{};
+  Context<double, joint_count> context;
+};
+/// The same in every run.
+std::vector<RandomPlace> random_places(const Robot& robot, std::size_t count);
+
+/// Ftool in F0. `source` is named in the message. \throws InputError  terms that the core refuses
+std::vector<Pose<double>> poses_of(const TermSet& set, const Robot& robot, const std::vector<RandomPlace>& at,
+                                   const std::string& source = "");
+
+/// From the poses of one set of terms to those of another.
+ToolShift tool_shift(const std::vector<Pose<double>>& from, const std::vector<Pose<double>>& to);
 
 struct ParameterChange {
   std::string name;
@@ -39,6 +58,9 @@ struct SetDifference {
 /// joints that came from either side.
 /// \throws std::invalid_argument  terms that the catalogue cannot name
 SetDifference difference(const TermSet& before, const TermSet& after, const Robot& robot, std::size_t poses);
+
+/// {"unchanged", "tool": {…}, "parameters": […]}, in the units of files.
+Json to_json(const SetDifference& d);
 
 }  // namespace flexcomp::host
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "identification/residuals.hpp"
-#include "measurement/noise_level.hpp"
 #include "measurement/observation.hpp"
+#include "measurement/simulation.hpp"
 #include "model/paper_model.hpp"
 #include "model/tolerance.hpp"
 #include "studies/paper.hpp"

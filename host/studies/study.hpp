@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "measurement/noise_level.hpp"
+#include "measurement/simulation.hpp"
 #include "report/plots.hpp"
 #include "studies/paper.hpp"
 

@@ -102,6 +102,12 @@ class Random {
   double around(double size) { return uniform(-size, size); }
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
 
+  /// Each within +-size.
+  Joints joints(double size) {
+    Joints q{};
+    for (double& v : q) v = around(size);
+    return q;
+  }
   Joints pose(const Robot& robot) {
     Joints q{};
     for (std::size_t i = 0; i < 6; ++i) q[i] = uniform(robot.limits[i].min_rad, robot.limits[i].max_rad);

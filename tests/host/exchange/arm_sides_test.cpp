@@ -8,13 +8,11 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
-#include <string>
 
-#include "files/robot_file.hpp"
-#include "flexcomp/forward.hpp"
-#include "flexcomp/model.hpp"
 #include "kinematics/nominal_inverse.hpp"
 #include "support/arms.hpp"
+#include "support/moving_arm.hpp"
+#include "support/robot_files.hpp"
 #include "units.hpp"
 
 namespace {
@@ -22,10 +20,6 @@ namespace {
 using namespace flexcomp;
 using namespace flexcomp::host;
 using Q = std::array<double, joint_count>;
-
-Robot robot_named(const std::string& name) {
-  return load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/" + name + ".yaml");
-}
 
 /// The one that fits; -1 where none or several do.
 int cfx_of(const Robot& robot, const Q& q) {
@@ -40,7 +34,7 @@ int cfx_of(const Robot& robot, const Q& q) {
 }
 
 TEST(ArmSides, AreThoseOfTheTableInPlainPostures) {
-  const Robot robot = robot_named("abb-irb120");
+  const Robot robot = support::robot("abb-irb120");
   const double d = radians(1);
   // Readings 0: upper arm up, forearm forward. The forearm passes the line of the upper arm 77 deg above its reading 0.
   EXPECT_EQ(cfx_of(robot, Q{0, 0, 0, 0, 30 * d, 0}), 0);
@@ -63,21 +57,15 @@ TEST(ArmSides, AreThoseOfTheTableInPlainPostures) {
 
 TEST(ArmSides, GiveEachWayToAPoseItsOwn) {
   for (const char* name : {"abb-irb120", "kuka-kr6-r900"}) {
-    const Robot robot = robot_named(name);
-    Model<double, joint_count, Capacity<1, 1, 6>> model;
-    model.begin(robot.nominal);
-    model.finish();
+    const Robot robot = support::robot(name);
+    const support::MovingArm nominal(robot);
     arms::Random random(4);
     std::size_t ways = 0;
     for (int n = 0; n < 15; ++n) {
-      Q q{};
-      for (std::size_t j = 0; j < joint_count; ++j) {
-        const JointLimits& l = robot.nominal.limits[j];
-        q[j] = (l.min_rad + l.max_rad) / 2 + random.around((l.max_rad - l.min_rad) / 2);
-      }
+      const Q q = random.pose(robot.nominal);
       if (std::abs(std::sin(q[4])) < 0.1) continue;
       std::map<int, Q> by_cfx;
-      for (const Q& way : nominal_inverses(robot.nominal, nominal_forward(model, q))) {
+      for (const Q& way : nominal_inverses(robot.nominal, nominal(q))) {
         const int cfx = cfx_of(robot, way);
         ASSERT_GE(cfx, 0) << name;
         const auto [at, first] = by_cfx.emplace(cfx, way);
@@ -93,9 +81,9 @@ TEST(ArmSides, GiveEachWayToAPoseItsOwn) {
 }
 
 TEST(ArmSides, AreNotThereWhereTheyCannotBeTold) {
-  EXPECT_FALSE(arm_sides(robot_named("ur5").nominal, Q{0.1, -1, 1, 0.2, 0.3, 0.4}));
+  EXPECT_FALSE(arm_sides(support::robot("ur5").nominal, Q{0.1, -1, 1, 0.2, 0.3, 0.4}));
   // Straight up with all readings 0, which is on neither side.
-  EXPECT_FALSE(arm_sides(robot_named("tx60l").nominal, Q{0.1, -1, 1, 0.2, 0.3, 0.4}));
+  EXPECT_FALSE(arm_sides(support::robot("tx60l").nominal, Q{0.1, -1, 1, 0.2, 0.3, 0.4}));
 }
 
 }  // namespace

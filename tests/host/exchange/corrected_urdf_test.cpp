@@ -9,7 +9,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -17,12 +16,11 @@
 #include "exchange/imported_arm.hpp"
 #include "exchange/rotation_angles.hpp"
 #include "files/calibration_file.hpp"
-#include "files/robot_file.hpp"
-#include "flexcomp/forward.hpp"
 #include "model/frames.hpp"
-#include "model/host_model.hpp"
 #include "support/arms.hpp"
 #include "support/drawn_arm.hpp"
+#include "support/moving_arm.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
 
@@ -30,10 +28,9 @@ namespace {
 
 using namespace flexcomp;
 using namespace flexcomp::host;
+using support::data;
+using support::MovingArm;
 using support::replaced;
-
-const std::string data = FLEXCOMP_SOURCE_DIR "/tests/data/";
-const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
 
 /// Judges the tip of a URDF in one of its links, by liburdfdom and KDL.
 drawn::Judge judge_of(const std::string& text, const std::string& base, const std::string& tip) {
@@ -83,24 +80,19 @@ double worst(const std::string& path, const UrdfLinks& links, const Robot& robot
   const UrdfArm arm = load_urdf(path, links);
   auto drawn = judge_of(support::read(path), arm.base, arm.tip);
   auto exported = judge_of(out.text, arm.base, out.tip);
-  const auto nominal = prepare(TermSet(), robot, "");
-  const auto model = prepare(set.terms, robot, "");
-  const auto context = default_context<double>(robot.nominal);
-  Workspace<double, 6> w;
+  const MovingArm nominal(robot);
+  const MovingArm model(robot, set.terms);
   // With two poses of the nominal arm L and R are known up to what commutes; take L from the import, whose frames the
   // tests of the import judge, where the robot file is an imported one.
   const ImportedArm imported = import_urdf(path, links);
   const Pose<double> left = imported.base_to_f0;
-  const Pose<double> right =
-      inverse(left * forward(*nominal, arms::Joints{}, context, w)) * drawn(arms::Joints{});
+  const Pose<double> right = inverse(left * nominal(arms::Joints{})) * drawn(arms::Joints{});
   arms::Random random(seed);
   double most = 0;
   for (int k = 0; k < poses; ++k) {
-    arms::Joints q{};
-    for (double& v : q) v = random.around(3.1);
-    EXPECT_LT(apart(left * forward(*nominal, q, context, w) * right, drawn(q)), 2e-8)
-        << "the nominal arms differ";
-    most = std::max(most, apart(left * forward(*model, q, context, w) * right, exported(q)));
+    const arms::Joints q = random.joints(3.1);
+    EXPECT_LT(apart(left * nominal(q) * right, drawn(q)), 2e-8) << "the nominal arms differ";
+    most = std::max(most, apart(left * model(q) * right, exported(q)));
   }
   return most;
 }
@@ -126,9 +118,9 @@ TEST(CorrectedUrdf, ItsTipGoesWhereTheRigidModelGoes) {
 TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
   arms::Random random(5);
   for (const auto& [file, urdf] :
-       {std::pair{"tx60l.yaml", "tx60l.urdf"}, std::pair{"kuka-kr6-r900.yaml", "kuka_kr6_r900.urdf"},
-        std::pair{"abb-irb120.yaml", "abb_irb120.urdf"}, std::pair{"ur5.yaml", "ur5.urdf"}}) {
-    const Robot robot = load_robot(robots + file);
+       {std::pair{"tx60l", "tx60l.urdf"}, std::pair{"kuka-kr6-r900", "kuka_kr6_r900.urdf"},
+        std::pair{"abb-irb120", "abb_irb120.urdf"}, std::pair{"ur5", "ur5.urdf"}}) {
+    const Robot robot = support::robot(file);
     Calibration set = some_errors(random);
     // The tool of the robot file is not in the URDF: its terms would turn about another point.
     std::erase_if(set.terms.terms, [](const Term<double>& t) { return t.place.body == body::tool; });
@@ -136,24 +128,20 @@ TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
     const UrdfArm arm = load_urdf(data + urdf, {});
     auto drawn = judge_of(support::read(data + urdf), arm.base, arm.tip);
     auto exported = judge_of(out.text, arm.base, out.tip);
-    const auto nominal = prepare(TermSet(), robot, "");
-    const auto model = prepare(set.terms, robot, "");
-    const auto context = default_context<double>(robot.nominal);
-    Workspace<double, 6> w;
+    const MovingArm nominal(robot);
+    const MovingArm model(robot, set.terms);
     // exported(q) = L · ours(q) · R with the L and R of the nominal arms, whatever they are:
     // drawn(p)^-1 drawn(q) = R^-1 n(p)^-1 n(q) R holds for the nominal pair; R from two frames at p = q:
     // eliminate both by comparing differences between calibrated and nominal motion in the base.
     // L: n(q) and drawn(q) give L n(q) R = drawn(q); from joint 1's axis and rotations between random poses:
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     const arms::Joints zero{};
-    const Pose<double> n0 = forward(*nominal, zero, context, w);
+    const Pose<double> n0 = nominal(zero);
     for (int k = 0; k < 50; ++k) {
-      arms::Joints q{};
-      for (double& v : q) v = random.around(1);
+      const arms::Joints q = random.joints(1);
       // drawn(q) drawn(0)^-1 = L n(q) n(0)^-1 L^-1: the axes of these turns are carried by L.
       const Eigen::AngleAxisd a(Eigen::Matrix3d(drawn(q).rotation * drawn(zero).rotation.transpose()));
-      const Eigen::AngleAxisd b(
-          Eigen::Matrix3d(forward(*nominal, q, context, w).rotation * n0.rotation.transpose()));
+      const Eigen::AngleAxisd b(Eigen::Matrix3d(nominal(q).rotation * n0.rotation.transpose()));
       sum += a.axis() * b.axis().transpose();
     }
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -166,9 +154,8 @@ TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
     for (int k = 0; k < 50; ++k) {
-      arms::Joints q{};
-      for (double& v : q) v = random.around(2);
-      const Pose<double> motion = forward(*nominal, q, context, w) * inverse(n0);
+      const arms::Joints q = random.joints(2);
+      const Pose<double> motion = nominal(q) * inverse(n0);
       const Pose<double> theirs = drawn(q) * inverse(drawn(zero));
       const Eigen::Matrix3d a = theirs.rotation - Eigen::Matrix3d::Identity();
       const Eigen::Vector3d b = left.rotation * motion.position - theirs.position;
@@ -180,9 +167,8 @@ TEST(CorrectedUrdf, OfRobotFilesWithFramesOfTheirOwn) {
     double most = 0;
     double least = 1;
     for (int k = 0; k < 200; ++k) {
-      arms::Joints q{};
-      for (double& v : q) v = random.around(3.1);
-      const Pose<double> ours = left * forward(*model, q, context, w) * right;
+      const arms::Joints q = random.joints(3.1);
+      const Pose<double> ours = left * model(q) * right;
       most = std::max(most, apart(ours, exported(q)));
       least = std::min(least, apart(ours, drawn(q)));
     }
@@ -281,28 +267,29 @@ TEST(CorrectedUrdf, AnotherArmIsRefusedByItsJoint) {
   }
 }
 
+/// Rot(z,yaw) Rot(y,pitch) Rot(x,roll)
+Eigen::Matrix3d rotation_by(const Eigen::Vector3d& rpy) {
+  return (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
 TEST(RollPitchYaw, AlsoWherePitchIsARightAngle) {
   arms::Random random(8);
   for (int n = 0; n < 20000; ++n) {
     const double near = n % 3 == 0   ? flexcomp::host::pi / 2 + random.around(n % 2 == 0 ? 1e-9 : 1e-6)
                         : n % 3 == 1 ? random.around(3.2)
                                      : -flexcomp::host::pi / 2;
-    const Eigen::Matrix3d r = (Eigen::AngleAxisd(random.around(3.2), Eigen::Vector3d::UnitZ()) *
-                               Eigen::AngleAxisd(near, Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(random.around(3.2), Eigen::Vector3d::UnitX()))
-                                  .toRotationMatrix();
-    const Eigen::Vector3d v = roll_pitch_yaw(r);
-    const Eigen::Matrix3d back = (Eigen::AngleAxisd(v.z(), Eigen::Vector3d::UnitZ()) *
-                                  Eigen::AngleAxisd(v.y(), Eigen::Vector3d::UnitY()) *
-                                  Eigen::AngleAxisd(v.x(), Eigen::Vector3d::UnitX()))
-                                     .toRotationMatrix();
+    const Eigen::Matrix3d r = rotation_by({random.around(3.2), near, random.around(3.2)});
+    const Eigen::Matrix3d back = rotation_by(roll_pitch_yaw(r));
     ASSERT_LT((back - r).norm(), 1e-14) << n;
   }
 }
 
 // What a URDF cannot hold is the difference to the whole model, nothing more and nothing less.
 TEST(LeftOutByRigid, IsWhatTheFlexibleModelAdds) {
-  const Robot robot = load_robot(robots + "tx60l.yaml");
+  const Robot& robot = support::tx60l();
   const Calibration truth = load_calibration(data + "tx60l_table1.yaml", robot);
   const LeftOut left = left_out_by_rigid(truth, robot, 500);
   EXPECT_EQ(left.effects.size(), 7U);
@@ -315,14 +302,10 @@ TEST(LeftOutByRigid, IsWhatTheFlexibleModelAdds) {
   EXPECT_LE(left.largest_m, sum);
   EXPECT_GT(left.largest_m, 0.5 * largest);
   // At one pose by hand: all with payload, as at a random pose of the sample, is within the bound.
-  const auto whole = prepare(truth.terms, robot, "");
-  const auto rigid = prepare(rigid_part(truth.terms), robot, "");
-  Workspace<double, 6> w;
-  const auto context = default_context<double>(robot.nominal);
+  const MovingArm whole(robot, truth.terms);
+  const MovingArm rigid(robot, rigid_part(truth.terms));
   const arms::Joints stretched{0, 1.5, 0, 0, 0, 0};
-  const double there =
-      (forward(*whole, stretched, context, w).position - forward(*rigid, stretched, context, w).position)
-          .norm();
+  const double there = (whole(stretched).position - rigid(stretched).position).norm();
   EXPECT_GT(there, 0.5 * left.largest_m) << "a stretched arm bends most";
   EXPECT_LT(there, 1.2 * left.largest_m);
   Calibration stiff;

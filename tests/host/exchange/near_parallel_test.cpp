@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -13,15 +12,15 @@
 
 #include "exchange/axis_chain.hpp"
 #include "exchange/imported_arm.hpp"
-#include "files/robot_file.hpp"
-#include "flexcomp/forward.hpp"
 #include "identification/identify.hpp"
 #include "identification/residuals.hpp"
 #include "identification/validate.hpp"
-#include "measurement/observation.hpp"
 #include "model/host_model.hpp"
 #include "model/paper_model.hpp"
 #include "support/arms.hpp"
+#include "support/measuring.hpp"
+#include "support/moving_arm.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
 
@@ -30,51 +29,36 @@ namespace {
 using namespace flexcomp;
 using namespace flexcomp::host;
 
-constexpr double position_sigma = 0.035e-3;
-const double orientation_sigma = radians(0.007);
-
-Robot load(const std::string& file) {
-  Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/" + file);
-  robot.nominal.tool_xyz_m = {0.01, 0.03, 0.06};
-  robot.position_sigma_m = position_sigma;
-  robot.orientation_sigma_rad = orientation_sigma;
-  return robot;
-}
-
-struct Measuring {
+struct Views {
+  double spread_rad = 3;  ///< of each joint around a middle pose
   std::size_t count = 60;
   bool pose = true;
-  double spread_rad = 3;  ///< of each joint around a middle pose
   std::uint64_t seed = 1;
 };
 
 /// What a tracker sees of the arm `truth`, without any term: its nominal numbers are the true ones.
-std::vector<Observation> measure(const Robot& truth, const Measuring& how) {
+std::vector<Observation> views(const Robot& truth, const Views& how) {
   const auto model = prepare(TermSet(), truth, "truth");
-  std::mt19937_64 random(how.seed);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> around(-how.spread_rad, how.spread_rad);
-  const std::array<double, 6> middle{0.2, -1.2, 1.4, -0.9, 1.1, 0.3};
-  const auto noise = [&](double sigma) {
-    const double x = sigma * normal(random);
-    const double y = sigma * normal(random);
-    return Eigen::Vector3d(x, y, sigma * normal(random));
-  };
+  measuring::Measuring measuring;
+  measuring.pose = how.pose;
+  std::mt19937_64 noise(how.seed);
+  arms::Random random(how.seed);
   std::vector<Observation> rows;
   for (std::size_t k = 0; k < how.count; ++k) {
-    Observation row;
-    for (std::size_t i = 0; i < 6; ++i) row.q_rad[i] = middle[i] + around(random);
-    row.context = default_context<double>(truth.nominal);
-    const Pose<double> pose = nominal_forward(*model, row.q_rad);
-    row.p_m = pose.position + noise(position_sigma);
-    row.R = rotation_of(noise(orientation_sigma)) * pose.rotation;
-    row.has_orientation = how.pose;
-    row.whitening.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / position_sigma;
-    if (how.pose) row.whitening.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / orientation_sigma;
-    row.line = k + 2;
-    rows.push_back(row);
+    arms::Joints q = random.joints(how.spread_rad);
+    const arms::Joints middle{0.2, -1.2, 1.4, -0.9, 1.1, 0.3};
+    for (std::size_t i = 0; i < 6; ++i) q[i] += middle[i];
+    rows.push_back(measuring::measure(*model, q, k, measuring, noise));
   }
   return rows;
+}
+
+Robot with_tool(const std::string& name) {
+  Robot robot = support::robot(name);
+  robot.nominal.tool_xyz_m = {0.01, 0.03, 0.06};
+  robot.position_sigma_m = measuring::kPosition;
+  robot.orientation_sigma_rad = measuring::kOrientation;
+  return robot;
 }
 
 /// The arm with the errors of manufacture on all of Eq. 1, and `tilt_rad` between the parallel axes.
@@ -109,26 +93,35 @@ double longest_mm(const Calibration& calibration, const Robot& robot) {
   return longest;
 }
 
-IdentifyOptions geometry() {
+/// The geometry of `drawing` by what is seen of `truth`.
+Identification identified(const Robot& drawing, const Robot& truth, const Views& how = {}) {
   IdentifyOptions options;
   options.model = ModelKind::geometric;
-  return options;
+  Identification r = identify(drawing, views(truth, how), "data", options);
+  EXPECT_TRUE(r.fit.converged);
+  return r;
+}
+
+/// Mean error (m) on views that were not identified from.
+double mean_on_others(const Robot& drawing, const Calibration& calibration, const Robot& truth,
+                      Views how = {}) {
+  how.seed = 99;
+  return validate(drawing, calibration, views(truth, how), "others").after.mean_m;
 }
 
 TEST(NearParallel, AnArmThatIsSlightlyOffParallelIsFoundWithSmallNumbers) {
-  for (const char* file : {"ur5.yaml", "ur10.yaml", "tx60l.yaml", "kuka-kr6-r900.yaml"}) {
-    const Robot drawing = load(file);
+  for (const char* file : {"ur5", "ur10", "tx60l", "kuka-kr6-r900"}) {
+    const Robot drawing = with_tool(file);
     for (const double tilt_deg : {0.0, 0.001, 0.05, 0.3}) {
       const Robot truth = manufactured(drawing, radians(tilt_deg), 5);
       for (const bool pose : {true, false}) {
-        Measuring how;
+        Views how;
         how.pose = pose;
-        const Identification r = identify(drawing, measure(truth, how), "data", geometry());
-        EXPECT_TRUE(r.fit.converged);
+        const Identification r = identified(drawing, truth, how);
         EXPECT_TRUE(r.identifiability.missing.empty()) << r.identifiability.missing.front();
-        EXPECT_LT(longest_mm(r.calibration, drawing), 2) << file << " " << tilt_deg;
-        how.seed = 99;
-        const double mean = validate(drawing, r.calibration, measure(truth, how), "others").after.mean_m;
+        const Calibration& found = r.calibration;
+        EXPECT_LT(longest_mm(found, drawing), 2) << file << " " << tilt_deg;
+        const double mean = mean_on_others(drawing, found, truth, how);
         EXPECT_LT(mean, 0.12e-3) << file << " " << tilt_deg << (pose ? " pose" : " position");
       }
     }
@@ -137,18 +130,16 @@ TEST(NearParallel, AnArmThatIsSlightlyOffParallelIsFoundWithSmallNumbers) {
 
 // In a corner of the workspace the lengths of parallel links are hardly known; they must come out unknown, not large.
 TEST(NearParallel, ASmallCornerOfTheWorkspaceLetsNothingRunOff) {
-  for (const char* file : {"ur5.yaml", "ur10.yaml"}) {
-    const Robot drawing = load(file);
+  for (const char* file : {"ur5", "ur10"}) {
+    const Robot drawing = with_tool(file);
     const Robot truth = manufactured(drawing, radians(0.05), 6);
     for (const double spread_deg : {30.0, 10.0}) {
-      Measuring how;
+      Views how;
       how.count = 200;
       how.spread_rad = radians(spread_deg);
-      const Identification r = identify(drawing, measure(truth, how), "data", geometry());
-      EXPECT_TRUE(r.fit.converged);
-      std::printf("%s, +-%.0f deg: longest change %.2f mm\n", file, spread_deg,
-                  longest_mm(r.calibration, drawing));
-      EXPECT_LT(longest_mm(r.calibration, drawing), 10) << file << " " << spread_deg;
+      const double longest = longest_mm(identified(drawing, truth, how).calibration, drawing);
+      std::printf("%s, +-%.0f deg: longest change %.2f mm\n", file, spread_deg, longest);
+      EXPECT_LT(longest, 10) << file << " " << spread_deg;
     }
   }
 }
@@ -157,7 +148,7 @@ TEST(NearParallel, ASmallCornerOfTheWorkspaceLetsNothingRunOff) {
 // beta.
 TEST(NearParallel, ADrawingThatIsSlightlyOffParallelTakesEitherParameter) {
   for (const double tilt_deg : {0.01, 0.5, 2.0, 5.0, 14.9, 15.1, 25.0}) {
-    Robot drawing = load("ur10.yaml");
+    Robot drawing = with_tool("ur10");
     for (const std::size_t i : {1U, 2U}) {
       drawing.nominal.links[i].alpha_rad += radians(i == 1 ? tilt_deg : 0);
       drawing.nominal.links[i].beta_rad += radians(i == 1 ? 0 : tilt_deg);
@@ -165,14 +156,11 @@ TEST(NearParallel, ADrawingThatIsSlightlyOffParallelTakesEitherParameter) {
     EXPECT_EQ(takes_beta(drawing.nominal)[1], tilt_deg < 15);
     EXPECT_EQ(takes_beta(drawing.nominal)[2], tilt_deg < 15);
     const Robot truth = manufactured(drawing, 0, 8);
-    Measuring how;
-    const Identification r = identify(drawing, measure(truth, how), "data", geometry());
-    EXPECT_TRUE(r.fit.converged);
-    how.seed = 99;
-    const double mean = validate(drawing, r.calibration, measure(truth, how), "others").after.mean_m;
+    const Calibration found = identified(drawing, truth).calibration;
+    const double mean = mean_on_others(drawing, found, truth);
     std::printf("drawn %.2f deg off parallel: longest change %.2f mm, %.4f mm on others\n", tilt_deg,
-                longest_mm(r.calibration, drawing), mean * 1e3);
-    EXPECT_LT(longest_mm(r.calibration, drawing), 10) << tilt_deg;
+                longest_mm(found, drawing), mean * 1e3);
+    EXPECT_LT(longest_mm(found, drawing), 10) << tilt_deg;
     EXPECT_LT(mean, 0.12e-3) << tilt_deg;
   }
 }
@@ -208,7 +196,7 @@ NominalRobot<6> plain_table(const NominalRobot<6>& robot) {
 // The maker's calibrated table of a UR5: hundreds of metres that cancel. It is refused as it is; imported, it is the same
 // arm with lengths of the drawing, and a better drawing to identify from.
 TEST(NearParallel, AMakersCalibratedTableIsImportedAndIdentifiedFrom) {
-  const Robot drawing = load("ur5.yaml");
+  const Robot drawing = with_tool("ur5");
   double longest = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Robot maker = manufactured(drawing, radians(0.05), seed);
@@ -222,15 +210,15 @@ TEST(NearParallel, AMakersCalibratedTableIsImportedAndIdentifiedFrom) {
       EXPECT_THROW(load_robot(path), InputError);
     }
     const ImportedArm imported = import_robot(path);
-    const auto before = prepare(TermSet(), maker, "maker");
-    const auto after = prepare(TermSet(), imported.robot, "imported");
+    const support::MovingArm before(maker);
+    const support::MovingArm after(imported.robot);
     arms::Random random(seed);
     for (int k = 0; k < 100; ++k) {
       const arms::Joints q = random.pose(maker.nominal);
-      const Pose<double> a = nominal_forward(*before, q);
-      const Pose<double> b = nominal_forward(*after, q);
+      const Pose<double> a = before(q);
+      const Pose<double> b = after(q);
       ASSERT_LT((a.position - b.position).norm(), 1e-9);
-      ASSERT_LT(rotation_vector(a.rotation * b.rotation.transpose()).norm(), 1e-9);
+      ASSERT_LT(arms::angle_between(a.rotation, b.rotation), 1e-9);
     }
     for (std::size_t i = 0; i < 6; ++i) {
       EXPECT_NEAR(imported.robot.nominal.links[i].a_m, drawing.nominal.links[i].a_m, 5e-3)
@@ -239,15 +227,12 @@ TEST(NearParallel, AMakersCalibratedTableIsImportedAndIdentifiedFrom) {
     }
     if (seed > 3) continue;
     Robot start = imported.robot;
-    start.position_sigma_m = position_sigma;
-    start.orientation_sigma_rad = orientation_sigma;
+    start.position_sigma_m = drawing.position_sigma_m;
+    start.orientation_sigma_rad = drawing.orientation_sigma_rad;
     const Robot truth = manufactured(maker, 0, seed + 100);
-    const Identification r = identify(start, measure(truth, Measuring()), "data", geometry());
-    EXPECT_TRUE(r.fit.converged);
-    EXPECT_LT(longest_mm(r.calibration, start), 5);
-    Measuring others;
-    others.seed = 99;
-    EXPECT_LT(validate(start, r.calibration, measure(truth, others), "others").after.mean_m, 0.12e-3);
+    const Calibration found = identified(start, truth).calibration;
+    EXPECT_LT(longest_mm(found, start), 5);
+    EXPECT_LT(mean_on_others(start, found, truth), 0.12e-3);
   }
   std::printf("longest d in the tables: %.0f m\n", longest);
   EXPECT_GT(longest, 100);

@@ -2,43 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """flexcomp compensate on programs of robot makers: what stands in a KUKA, ABB or Stäubli program comes out as what the plain
 CSV of the same targets gives, on the branch that the target names, and every other byte stays."""
-import csv, json, math, os, random, re, subprocess, sys, tempfile
-work = tempfile.TemporaryDirectory()
-os.chdir(work.name)
-flexcomp, root = os.environ["FLEXCOMP_BIN_DIR"] + "/flexcomp", os.environ["FLEXCOMP_SOURCE_DIR"]
-failures = 0
-
-def run(*arguments):
-    r = subprocess.run([flexcomp, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    return r.returncode, r.stdout, r.stderr
-
-def fail(*words):
-    global failures
-    failures += 1
-    print("FAILED:", *words)
-
-def write(path, text):
-    with open(path, "w", newline="", encoding="utf-8") as f: f.write(text)
-
-def read(path):
-    with open(path, newline="", encoding="utf-8") as f: return f.read()
-
-def rows(path):
-    with open(path, newline="") as f: return list(csv.DictReader(f))
-
-def done(*arguments):
-    code, said, warned = run(*arguments)
-    if code: fail(arguments, code, said, warned)
-    return said + warned
-
-q = ["q%d_deg" % j for j in range(1, 7)]
+import json, math, os, random, re
+from command import done, fail, finish, matrix, q, quat, read, root, rows, run, write, xyz
 dice = random.Random(2)
 geometry = "geometric:\n" + "".join("  - {link: %d, theta_deg: %g, d_mm: %g, a_mm: %g, alpha_deg: %g}\n" % (
     i, *(dice.uniform(-s, s) for s in (0.1, 0.5, 0.5, 0.1))) for i in range(1, 7)).replace("link: 2, theta_deg", "link: 2, theta_deg")
 write("cal.yaml", geometry + "effects:\n  - {effect: joint_compliance, joint: 2, rad_per_nm: 2.0e-5}\n")
 
-def matrix(w, x, y, z):
-    return [[1-2*(y*y+z*z), 2*(x*y-w*z), 2*(x*z+w*y)], [2*(x*y+w*z), 1-2*(x*x+z*z), 2*(y*z-w*x)], [2*(x*z-w*y), 2*(y*z+w*x), 1-2*(x*x+y*y)]]
 def abc(m):  # KUKA: Rz(A) Ry(B) Rx(C)
     return [math.degrees(v) for v in (math.atan2(m[1][0], m[0][0]), math.atan2(-m[2][0], math.hypot(m[0][0], m[1][0])), math.atan2(m[2][1], m[2][2]))]
 def from_abc(a, b, c):
@@ -64,8 +34,8 @@ done("predict", "--robot", kuka, "--joints", "c.csv", "-o", "pc.csv", "--quiet")
 corrected = rows("c.csv")
 nominal, reached = rows("p.csv"), rows("pc.csv")
 def kuka_pose(r):
-    p = turned([float(r[c]) for c in ("x_mm", "y_mm", "z_mm")])
-    m = matrix(*(float(r[c]) for c in ("qw", "qx", "qy", "qz")))
+    p = turned([float(r[c]) for c in xyz])
+    m = matrix(*(float(r[c]) for c in quat))
     return p, [m[0], [-v for v in m[1]], [-v for v in m[2]]]
 def turn(p): return sum(1 << j for j, v in enumerate(p) if v < 0)
 
@@ -189,7 +159,6 @@ done(*base, "--targets", "t.csv", "-o", "c.csv", "--quiet")
 done("predict", "--robot", abb, "--joints", "t.csv", "-o", "p.csv", "--quiet")
 done("predict", "--robot", abb, "--joints", "c.csv", "-o", "pc.csv", "--quiet")
 corrected, nominal, reached = rows("c.csv"), rows("p.csv"), rows("pc.csv")
-xyz, quat = ("x_mm", "y_mm", "z_mm"), ("qw", "qx", "qy", "qz")
 module = ["MODULE Weld\n  ! robtarget old:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
           "  PERS tooldata torch:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];\n",
           "  CONST speeddata slow:=[50,20,5000,1000];\n  CONST string s:=\"[[1,2,3,4,5,6],[1,2,3,4,5,6]]\";\n"]
@@ -258,5 +227,4 @@ for r, line in zip(rows("c.csv"), [l for l in after.split("\n") if "<Value" in l
 write("x.txt", dtx)
 done(*base, "--targets", "x.txt", "--format", "val3", "-o", "x_out.txt", "--quiet")
 if read("x_out.txt") != after: fail("--format")
-print(failures, "failures")
-sys.exit(failures != 0)
+finish()

@@ -6,26 +6,21 @@
 
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <random>
 
-#include "files/robot_file.hpp"
 #include "model/effects.hpp"
 #include "model/parameter_image.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
-namespace {
+namespace calibration_files {
 
 using namespace flexcomp::host;
 using namespace flexcomp;
 using support::expect_refused;
 using support::replaced;
+using support::tx60l;
 using testing::HasSubstr;
-
-const Robot& tx60l() {
-  static const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
-  return robot;
-}
 
 // Every key of docs/effects.md.
 const std::string full =
@@ -146,6 +141,11 @@ double random_coefficient(std::mt19937_64& random) {
   }
 }
 
+/// With what is not understood.
+std::vector<std::uint8_t> image_of(const Calibration& calibration, std::uint32_t sequence = 1) {
+  return make_image(calibration, tx60l(), sequence, {.allow_unnamed = true});
+}
+
 TEST(CalibrationFile, ImageToFileToImageIsTheIdentityOnBytes) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 200; ++round) {
@@ -156,28 +156,26 @@ TEST(CalibrationFile, ImageToFileToImageIsTheIdentityOnBytes) {
         t.coefficient = random_coefficient(random);
     }
     for (std::size_t k = 0; k < 6; ++k) c.terms.values[k] = random_coefficient(random);
-    const auto image = make_image(c, tx60l(), 7, {.allow_unnamed = true});
+    const auto image = image_of(c, 7);
     Calibration pulled = calibration_from_image(image, tx60l(), "bus");
     stamp(pulled, tx60l());
     const std::string path = support::path_of("pulled.yaml");
     save_calibration(path, pulled, tx60l());
     const Calibration read = load_calibration(path, tx60l());
-    ASSERT_EQ(make_image(read, tx60l(), read.sequence.value(), {.allow_unnamed = true}), image);
+    ASSERT_EQ(image_of(read, read.sequence.value()), image);
   }
 }
 
 TEST(Image, LeavesOutWhatBelongsToTheMeasurement) {
   const Calibration c = load(full);
-  const Calibration pulled =
-      calibration_from_image(make_image(c, tx60l(), 1, {.allow_unnamed = true}), tx60l(), "bus");
+  const Calibration pulled = calibration_from_image(image_of(c), tx60l(), "bus");
   for (const Term<double>& t : pulled.terms.terms) {
     EXPECT_FALSE(belongs_to_measurement(t.effect));
     EXPECT_FALSE(t.effect == Effect::geometric && t.place.body == body::base) << "frames are fitted";
   }
   Calibration nominal_frames = c;
   nominal_frames.frames.reset();
-  const Calibration with_base =
-      calibration_from_image(make_image(nominal_frames, tx60l(), 1, {.allow_unnamed = true}), tx60l(), "bus");
+  const Calibration with_base = calibration_from_image(image_of(nominal_frames), tx60l(), "bus");
   EXPECT_EQ(with_base.terms.terms.size(), pulled.terms.terms.size() + 6);
 }
 
@@ -187,8 +185,7 @@ TEST(Image, IsTheSameWhateverTheOrderOfTheTerms) {
   std::reverse(turned.terms.terms.begin(), turned.terms.terms.begin() + 20);
   std::reverse(turned.terms.terms.begin(), turned.terms.terms.begin() + 4);
   EXPECT_NE(turned.terms.terms[0].place, c.terms.terms[0].place);
-  EXPECT_EQ(make_image(turned, tx60l(), 1, {.allow_unnamed = true}),
-            make_image(c, tx60l(), 1, {.allow_unnamed = true}));
+  EXPECT_EQ(image_of(turned), image_of(c));
 }
 
 TEST(Image, RefusesWhatIsNotUnderstoodOrTooLarge) {
@@ -199,12 +196,11 @@ TEST(Image, RefusesWhatIsNotUnderstoodOrTooLarge) {
   for (Term<double>& t : large.terms.terms) {
     if (t.place == Place{body::tool, slot::rz}) t.coefficient = radians(3);
   }
-  expect_refused([&] { make_image(large, tx60l(), 1, {.allow_unnamed = true}); }, 0, "tool.rz_deg",
-                 {"20 mm"});
+  expect_refused([&] { image_of(large); }, 0, "tool.rz_deg", {"20 mm"});
 }
 
 TEST(Image, RefusesEveryTruncationAndEveryAlteredByte) {
-  const auto image = make_image(load(full), tx60l(), 1, {.allow_unnamed = true});
+  const auto image = image_of(load(full));
   for (std::size_t size = 0; size < image.size(); ++size) {
     EXPECT_THROW(calibration_from_image(std::span(image).first(size), tx60l(), "file"), InputError) << size;
   }
@@ -213,7 +209,7 @@ TEST(Image, RefusesEveryTruncationAndEveryAlteredByte) {
     altered[k] = static_cast<std::uint8_t>(altered[k] ^ 0x10U);
     EXPECT_THROW(calibration_from_image(altered, tx60l(), "file"), InputError) << k;
   }
-  const Robot other = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/ur5.yaml");
+  const Robot other = support::robot("ur5");
   expect_refused([&] { calibration_from_image(image, other, "can:vcan0"); }, 0, "",
                  {"can:vcan0", "another robot"});
 }
@@ -276,4 +272,4 @@ TEST(CalibrationFile, IsWrittenWholeOrNotAtAll) {
   }
 }
 
-}  // namespace
+}  // namespace calibration_files

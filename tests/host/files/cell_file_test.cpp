@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include "files/robot_file.hpp"
 #include "planning/feasibility.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
-namespace {
+namespace cell_files {
 
 using namespace flexcomp::host;
 using support::expect_refused;
@@ -38,7 +38,7 @@ TEST(CellFile, ReadsTheDocumentedExample) {
 
 TEST(CellFile, TheExampleLeavesRoomForEveryRobotOfTheProject) {
   for (const char* name : {"tx60l", "rx160l", "ur5", "ur10"}) {
-    const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/" + std::string(name) + ".yaml");
+    const Robot robot = support::robot(name);
     const Feasibility feasibility(robot, load_cell(example));
     EXPECT_EQ(feasible_poses(feasibility, robot, 100, 1).size(), 100U) << name;
   }
@@ -103,4 +103,4 @@ TEST(CellFile, RefusesWhatIsNoYaml) {
   refused("[1, 2\n", 2, "");
 }
 
-}  // namespace
+}  // namespace cell_files

@@ -1,28 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "files/data_file.hpp"
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
 
-#include "files/robot_file.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
 
-namespace {
+namespace data_files {
 
 using namespace flexcomp::host;
 using support::expect_refused;
 using support::replaced;
+using support::tx60l;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-const Robot& tx60l() {
-  static const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
-  return robot;
-}
 
 const std::string joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
 const std::string good = joints +
@@ -236,15 +232,12 @@ TEST(MeasuredData, ReadsBackTheIdenticalDoubles) {
     for (std::size_t k = 0; k < written.rows.size(); ++k) {
       const Measurement& a = written.rows[k];
       const Measurement& b = again.rows[k];
-      EXPECT_EQ(a.q_rad, b.q_rad);
-      EXPECT_EQ(a.move_rad, b.move_rad);
-      EXPECT_EQ(a.context.payload_kg, b.context.payload_kg);
-      EXPECT_EQ(a.context.payload_com_m, b.context.payload_com_m);
-      EXPECT_EQ(a.context.force_n, b.context.force_n);
-      EXPECT_EQ(a.context.time_s, b.context.time_s);
-      EXPECT_EQ(a.context.temperature_c, b.context.temperature_c);
-      EXPECT_EQ(a.position_sigma_m, b.position_sigma_m);
-      EXPECT_EQ(a.orientation_sigma_rad, b.orientation_sigma_rad);
+      const auto parts = [](const Measurement& m) {
+        const auto& c = m.context;
+        return std::tuple(m.q_rad, m.move_rad, c.payload_kg, c.payload_com_m, c.force_n, c.time_s,
+                          c.temperature_c, m.position_sigma_m, m.orientation_sigma_rad);
+      };
+      EXPECT_EQ(parts(a), parts(b)) << k;
       if (kind != MeasurementKind::reflectors) {
         EXPECT_EQ(a.position_m, b.position_m);
       }
@@ -289,4 +282,4 @@ TEST(RealData, EverySetLoads) {
   EXPECT_EQ(load_data(folder + "/ur10-ipa/series_b.csv", ur10).rows.size(), 1495U);
 }
 
-}  // namespace
+}  // namespace data_files

@@ -4,15 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <random>
 #include <string>
-#include <typeinfo>
 
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
-#include "model/effects.hpp"
 #include "model/parameter_image.hpp"
+#include "support/mutation.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
 namespace {
@@ -20,61 +19,24 @@ namespace {
 using namespace flexcomp::host;
 
 constexpr int rounds = 1500;
-const std::string root = FLEXCOMP_SOURCE_DIR;
-
-/// A few bytes replaced, removed, doubled or moved.
-std::string mutated(std::string text, std::mt19937_64& random) {
-  static const std::string bytes = "0123456789.-+e,:[]{}\"'#&*!|>%@~ \n\r\t\\_abnxyz\xEF";
-  const std::size_t changes = 1 + random() % 3;
-  for (std::size_t k = 0; k < changes && !text.empty(); ++k) {
-    const std::size_t at = random() % text.size();
-    const std::size_t length = 1 + random() % 12;
-    switch (random() % 4) {
-      case 0:
-        text[at] = bytes[random() % bytes.size()];
-        break;
-      case 1:
-        text.erase(at, length);
-        break;
-      case 2:
-        text.insert(at, text.substr(random() % text.size(), length));
-        break;
-      default:
-        text.resize(at);
-    }
-  }
-  return text;
-}
 
 void read_mutations(const std::string& good, const std::function<void(const std::string& path)>& read) {
-  std::mt19937_64 random(1);
-  int refused = 0;
-  for (int k = 0; k < rounds; ++k) {
-    const std::string text = mutated(good, random);
-    const std::string path = support::write("mutation", text);
-    try {
-      read(path);
-    } catch (const InputError&) {
-      ++refused;
-    } catch (const std::exception& e) {
-      FAIL() << "threw " << typeid(e).name() << ": " << e.what() << "\n" << text;
-    }
-  }
+  const int refused =
+      support::refused_mutations(good, {rounds, "0123456789.-+e,:[]{}\"'#&*!|>%@~ \n\r\t\\_abnxyz\xEF"},
+                                 [&](const std::string& text) { read(support::write("mutation", text)); });
   EXPECT_GT(refused, rounds / 10);
   EXPECT_LT(refused, rounds);
 }
 
-Robot tx60l() { return load_robot(root + "/host/robots/tx60l.yaml"); }
-
 TEST(Mutations, OfARobotFile) {
-  read_mutations(support::read(root + "/host/robots/tx60l.yaml"),
+  read_mutations(support::read(support::robots + "tx60l.yaml"),
                  [](const std::string& path) { load_robot(path); });
 }
 
 TEST(Mutations, OfACalibration) {
-  const Robot robot = tx60l();
+  const Robot& robot = support::tx60l();
   const std::string good =
-      support::read(root + "/tests/data/tx60l_table1.yaml") +
+      support::read(support::data + "tx60l_table1.yaml") +
       "  - {effect: joint_curve, joint: 1, coefficients_rad: [0, 1.0e-4, 0, -1.0e-4, 0, 0]}\n"
       "  - {effect: unnamed, place: link3.theta, of: [q2, payload_kg], grid: [[-30, 30], [0, 5]], "
       "values_rad: [[0, 1], [2, "
@@ -90,7 +52,7 @@ TEST(Mutations, OfACalibration) {
 }
 
 TEST(Mutations, OfADataFile) {
-  const Robot robot = tx60l();
+  const Robot& robot = support::tx60l();
   const std::string good =
       "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz,payload_kg,move1_deg,dir2\n"
       "10,20,30,40,50,60,100.5,-200,1e2,1,0,0,0,1.108,5,-1\n"

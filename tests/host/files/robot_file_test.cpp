@@ -5,19 +5,18 @@
 
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <random>
 
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
 
-namespace {
+namespace robot_files {
 
 using namespace flexcomp::host;
 using support::expect_refused;
 using support::replaced;
-
-const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
+using support::robots;
 
 // Line 1 is the name, line 3 joint 1 … line 8 joint 6.
 const std::string good =
@@ -40,7 +39,7 @@ void refused(const std::string& text, std::size_t line, const std::string& field
 }
 
 TEST(Robot, ReadsTheContractsExample) {
-  const Robot r = load_robot(robots + "tx60l.yaml");
+  const Robot& r = support::tx60l();
   EXPECT_EQ(r.name, "staubli-tx60l");
   EXPECT_EQ(r.nominal.links[1].a_m, 0.4);
   EXPECT_EQ(r.nominal.links[5].d_m, 0.07);  // the nearest double, not 70 times the double 0.001
@@ -180,4 +179,4 @@ TEST(Units, ShortNumbersStayShort) {
   EXPECT_EQ(format_si(-0.0, unit::mm), "-0");
 }
 
-}  // namespace
+}  // namespace robot_files

@@ -10,47 +10,31 @@
 #include <numeric>
 #include <random>
 
-#include "files/robot_file.hpp"
 #include "measurement/observation.hpp"
+#include "support/noise.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
 namespace {
 
 using namespace flexcomp::host;
 using namespace flexcomp;
+using support::Noise;
+using support::tx60l;
+using support::Vector6d;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const Robot& tx60l() {
-  static const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
-  return robot;
-}
-
-class Noise {
- public:
-  explicit Noise(std::uint64_t seed) : random_(seed) {}
-  double operator()() { return normal_(random_); }
-  Eigen::Vector3d vector() { return {(*this)(), (*this)(), (*this)()}; }
-  Pose<double> pose() {
-    Eigen::Quaterniond q((*this)(), (*this)(), (*this)(), (*this)());
-    return {q.normalized().toRotationMatrix(), vector()};
-  }
-
- private:
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-};
-
 /// Rows of measured reflectors with their true poses.
-struct Measured {
+struct MeasuredRows {
   MeasuredData data;
   std::vector<Pose<double>> truth;
 };
 
-Measured measure(std::size_t rows, std::size_t reflectors, double sigma_m, std::uint64_t seed) {
+MeasuredRows measure(std::size_t rows, std::size_t reflectors, double sigma_m, std::uint64_t seed) {
   Noise noise(seed);
-  Measured m;
+  MeasuredRows m;
   m.data.path = "data.csv";
   m.data.kind = MeasurementKind::reflectors;
   m.data.reflectors = reflectors;
@@ -68,28 +52,25 @@ Measured measure(std::size_t rows, std::size_t reflectors, double sigma_m, std::
   return m;
 }
 
-Vector6<double> error_of(const Observation& o, const Pose<double>& truth) {
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(o.R * truth.rotation.transpose()));
-  Vector6<double> e;
-  e << o.p_m - truth.position, turn.angle() * turn.axis();
-  return e;
+Vector6d error_of(const Observation& o, const Pose<double>& truth) {
+  return support::error_of({o.R, o.p_m}, truth);
 }
 
 TEST(Reflectors, ExactPointsGiveTheExactPose) {
-  const Measured m = measure(20, 4, 1e-13, 1);
+  const MeasuredRows m = measure(20, 4, 1e-13, 1);
   const auto observations = observe(m.data, tx60l());
   for (std::size_t k = 0; k < 20; ++k) EXPECT_LT(error_of(observations[k], m.truth[k]).norm(), 1e-11);
 }
 
 TEST(Reflectors, WhitenedErrorsHaveUnitCovariance) {
   for (const std::size_t reflectors : {3U, 4U}) {
-    const Measured m = measure(20000, reflectors, 35e-6, 2);
+    const MeasuredRows m = measure(20000, reflectors, 35e-6, 2);
     std::vector<std::string> warnings;
     const auto observations = observe(m.data, tx60l(), &warnings);
     Matrix6d covariance = Matrix6d::Zero();
     double chi2 = 0;
     for (std::size_t k = 0; k < observations.size(); ++k) {
-      const Vector6<double> w = observations[k].whitening * error_of(observations[k], m.truth[k]);
+      const Vector6d w = observations[k].whitening * error_of(observations[k], m.truth[k]);
       covariance += w * w.transpose() / static_cast<double>(observations.size());
       chi2 += observations[k].misfit_chi2 / static_cast<double>(observations.size());
     }
@@ -103,7 +84,7 @@ TEST(Reflectors, WhitenedErrorsHaveUnitCovariance) {
 TEST(Reflectors, NamesTheReflectorThatMoved) {
   for (const std::size_t reflectors : {3U, 4U}) {
     for (std::size_t moved = 0; moved < reflectors; ++moved) {
-      Measured m = measure(30, reflectors, 35e-6, 3 + moved);
+      MeasuredRows m = measure(30, reflectors, 35e-6, 3 + moved);
       // Along the line to a neighbour: a distance changes, which is what can be seen.
       const Eigen::Vector3d along =
           m.data.rows[12].reflector_m[moved] - m.data.rows[12].reflector_m[(moved + 1) % 3];
@@ -212,7 +193,7 @@ TEST(Reflectors, AChangeOfOneDistanceMayBeEitherEnd) {
   EXPECT_GT(s.probability[1], 0.1);
   EXPECT_GT(s.probability[2], 0.1);
   // The same from the data: one warning for the whole run of rows, with both letters.
-  Measured m = measure(30, 3, 35e-6, 9);
+  MeasuredRows m = measure(30, 3, 35e-6, 9);
   for (std::size_t k = 12; k < 18; ++k)
     m.data.rows[k].reflector_m[2] = m.truth[k].rotation * slipped[2] + m.truth[k].position;
   std::vector<std::string> warnings;
@@ -239,7 +220,7 @@ TEST(Reflectors, TwoThatMovedAreNotBlamedOnOne) {
 }
 
 TEST(Reflectors, AnotherSlipOrARowBetweenIsAnotherWarning) {
-  Measured m = measure(40, 4, 35e-6, 10);
+  MeasuredRows m = measure(40, 4, 35e-6, 10);
   for (const std::size_t k : {10U, 11U, 12U})
     m.data.rows[k].reflector_m[0] += m.truth[k].rotation * Eigen::Vector3d(0, -1e-3, 0);
   for (const std::size_t k : {13U, 14U, 20U})
@@ -252,7 +233,7 @@ TEST(Reflectors, AnotherSlipOrARowBetweenIsAnotherWarning) {
 }
 
 TEST(Reflectors, AWrongTemplateIsSaidOnce) {
-  const Measured m = measure(30, 4, 35e-6, 4);
+  const MeasuredRows m = measure(30, 4, 35e-6, 4);
   Robot other = tx60l();
   other.reflectors_m[3].x() += 1e-3;
   std::vector<std::string> warnings;
@@ -270,7 +251,7 @@ TEST(Reflectors, FrameOfThePaper) {
 }
 
 TEST(Reflectors, AnEstimatedTemplateHasTheShapeOfTheTool) {
-  const Measured m = measure(400, 4, 35e-6, 5);
+  const MeasuredRows m = measure(400, 4, 35e-6, 5);
   Robot unknown = tx60l();
   unknown.reflectors_m.clear();
   std::vector<std::string> warnings;
@@ -278,9 +259,9 @@ TEST(Reflectors, AnEstimatedTemplateHasTheShapeOfTheTool) {
   EXPECT_THAT(warnings, IsEmpty());
   // The gauge differs from Ftool by one rigid transform E, the same in every row.
   const Pose<double> e = reflector_frame(std::span(tx60l().reflectors_m).first(3));
-  Vector6<double> mean = Vector6<double>::Zero();
+  Vector6d mean = Vector6d::Zero();
   for (std::size_t k = 0; k < observations.size(); ++k) {
-    const Vector6<double> error = error_of(observations[k], m.truth[k] * e);
+    const Vector6d error = error_of(observations[k], m.truth[k] * e);
     mean += error / 400;
     EXPECT_LT((observations[k].whitening * error).norm(), 7);
   }
@@ -289,7 +270,7 @@ TEST(Reflectors, AnEstimatedTemplateHasTheShapeOfTheTool) {
 }
 
 TEST(Reflectors, RefusesPointsOnOneLine) {
-  Measured m = measure(3, 3, 1e-5, 6);
+  MeasuredRows m = measure(3, 3, 1e-5, 6);
   m.data.rows[1].reflector_m[1] = (m.data.rows[1].reflector_m[0] + m.data.rows[1].reflector_m[2]) / 2;
   support::expect_refused([&] { observe(m.data, tx60l()); }, 3, "ax_mm … cz_mm", {"one line"});
   m = measure(3, 4, 1e-5, 6);

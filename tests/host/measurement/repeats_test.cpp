@@ -6,17 +6,18 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <random>
 
 #include "measurement/reflectors.hpp"
+#include "support/noise.hpp"
 #include "units.hpp"
 
 namespace {
 
 using namespace flexcomp::host;
+using support::Noise;
+using support::Vector6d;
 using testing::ElementsAre;
 using testing::IsEmpty;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 #if defined(__SANITIZE_ADDRESS__)
 constexpr int draws = 400;
@@ -25,17 +26,6 @@ constexpr int draws = 4000;
 #endif
 /// Of a share p of all draws, four standard errors.
 double margin(double p) { return 4 * std::sqrt(p * (1 - p) / draws); }
-
-class Normal {
- public:
-  explicit Normal(std::uint64_t seed) : random_(seed) {}
-  double operator()() { return normal_(random_); }
-  Eigen::Vector3d vector() { return {(*this)(), (*this)(), (*this)()}; }
-
- private:
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-};
 
 struct Kind {
   bool orientation = true;
@@ -66,7 +56,7 @@ struct Measured {
 };
 
 /// `counts` rows at each of as many poses; the model is right but for `missing` and the offset.
-Measured measured(const std::vector<int>& counts, const Kind& kind, Normal& normal) {
+Measured measured(const std::vector<int>& counts, const Kind& kind, Noise& normal) {
   Measured m;
   std::vector<Vector6d> residuals;
   for (const int count : counts) {
@@ -115,7 +105,7 @@ Measured measured(const std::vector<int>& counts, const Kind& kind, Normal& norm
 }
 
 TEST(Repeats, AreRowsWithTheSameReadingsAndContext) {
-  Normal normal(1);
+  Noise normal(1);
   std::vector<Observation> rows = measured({1, 1, 1, 1, 1, 1, 1, 1}, {}, normal).rows;
   EXPECT_THAT(repeats(rows), IsEmpty());
   EXPECT_FALSE(pure_error(rows, 1, 1));
@@ -169,14 +159,14 @@ TEST(Repeats, HalfATurnIsNoObstacle) {
   Observation row;
   row.has_orientation = true;
   row.whitening.setIdentity();
-  row.R = Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  row.R = Eigen::AngleAxisd(flexcomp::host::pi, Eigen::Vector3d::UnitX()).toRotationMatrix();
   std::vector<Observation> rows{row, row};
   rows[1].R = Eigen::AngleAxisd(2e-4, Eigen::Vector3d::UnitY()).toRotationMatrix() * row.R;
   EXPECT_NEAR(pure_error(rows, 1, 10)->sigma_orientation_rad, std::sqrt(2e-8 / 3), 1e-12);
 }
 
 TEST(Repeats, IntervalsCoverTheTrueScatter) {
-  Normal normal(2);
+  Noise normal(2);
   for (const Kind& kind :
        {Kind{}, Kind{false}, Kind{true, true}, Kind{true, false, 1.7}, Kind{true, true, 1, 3}}) {
     int position = 0;
@@ -213,7 +203,7 @@ TEST(Repeats, IntervalsCoverTheTrueScatter) {
 }
 
 TEST(Repeats, LackOfFitRaisesNoFalseAlarmWhateverTheTrueNoise) {
-  Normal normal(3);
+  Noise normal(3);
   for (const Kind& kind : {Kind{}, Kind{false}, Kind{true, true}, Kind{true, false, 3}}) {
     int alarms = 0;
     int rare = 0;
@@ -231,7 +221,7 @@ TEST(Repeats, LackOfFitRaisesNoFalseAlarmWhateverTheTrueNoise) {
 }
 
 TEST(Repeats, LackOfFitFindsWhatTheModelMisses) {
-  Normal normal(4);
+  Noise normal(4);
   int found = 0;
   int found_little = 0;
   for (int k = 0; k < draws; ++k) {
@@ -249,7 +239,7 @@ TEST(Repeats, LackOfFitFindsWhatTheModelMisses) {
 }
 
 TEST(Repeats, RowsOfUnequalNoiseAreWeighted) {
-  Normal normal(5);
+  Noise normal(5);
   double chi2 = 0;
   double sum = 0;
   for (int k = 0; k < draws; ++k) {

@@ -3,19 +3,20 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <set>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "files/calibration_file.hpp"
 #include "files/read_file.hpp"
-#include "files/robot_file.hpp"
 #include "files/write_file.hpp"
-#include "model/covariate.hpp"
 #include "model/effects.hpp"
 #include "model/place.hpp"
+#include "support/robot_files.hpp"
 
 namespace {
 
@@ -26,66 +27,48 @@ const std::string page = FLEXCOMP_SOURCE_DIR "/docs/effects.md";
 const std::string begin_mark = "<!-- from the descriptors: begin -->\n";
 const std::string end_mark = "<!-- from the descriptors: end -->\n";
 
-std::string basis_text(const Term<double>& t, const EffectId& id) {
-  const unsigned j = t.joint + 1U;
-  const std::string order = id.order == 1 ? "" : fmt::format("{:g}·", id.order);
-  switch (t.basis) {
-    case Basis::one:
-      return "1";
-    case Basis::load_torque:
-      return fmt::format("τ{}", j);
-    case Basis::load_torque_cubed:
-      return fmt::format("τ{}³", j);
-    case Basis::link_weight:
-      return fmt::format("s of joint {} to joint {}", j, t.distal_joint + 1);
-    case Basis::joint_position:
-      return fmt::format("q{}", j);
-    case Basis::sine:
-      return fmt::format("sin {}q{}", order, j);
-    case Basis::cosine:
-      return fmt::format("cos {}q{}", order, j);
-    case Basis::direction:
-      return fmt::format("−direction of joint {}", j);
-    case Basis::relative_speed:
-      return fmt::format("u{}", j);
-    case Basis::thermal:
-      return "(temperature − reference) × length";
-    case Basis::time:
-      return "time";
-    case Basis::load_moment_x:
-      return fmt::format("load moment about x{}", j);
-    case Basis::load_moment_y:
-      return fmt::format("load moment about y{}", j);
-    case Basis::base_moment_x:
-      return "load moment about x of F0 through the pivot";
-    case Basis::base_moment_y:
-      return "load moment about y of F0 through the pivot";
-    case Basis::curve:
-      return fmt::format("curve of q{}", j);
-    case Basis::step:
-      return "step at `after_s`";
-    case Basis::grid:
-      return "grid of two covariates";
-  }
-  return "";
+/// Of joint {0}; {1} times its reading, to joint {2}.
+const auto bases = std::to_array<std::pair<Basis, const char*>>({
+    {Basis::one, "1"},
+    {Basis::load_torque, "τ{0}"},
+    {Basis::load_torque_cubed, "τ{0}³"},
+    {Basis::link_weight, "s of joint {0} to joint {2}"},
+    {Basis::joint_position, "q{0}"},
+    {Basis::sine, "sin {1}q{0}"},
+    {Basis::cosine, "cos {1}q{0}"},
+    {Basis::direction, "−direction of joint {0}"},
+    {Basis::relative_speed, "u{0}"},
+    {Basis::thermal, "(temperature − reference) × length"},
+    {Basis::time, "time"},
+    {Basis::load_moment_x, "load moment about x{0}"},
+    {Basis::load_moment_y, "load moment about y{0}"},
+    {Basis::base_moment_x, "load moment about x of F0 through the pivot"},
+    {Basis::base_moment_y, "load moment about y of F0 through the pivot"},
+    {Basis::curve, "curve of q{0}"},
+    {Basis::step, "step at `after_s`"},
+    {Basis::grid, "grid of two covariates"},
+});
+
+const auto needed = std::to_array<std::pair<Needs, const char*>>({
+    {Needs::poses, "–"},
+    {Needs::load, "`payload_kg`, or `fx_n fy_n fz_n`"},
+    {Needs::direction, "`dir1 … dir6`, or `move1_deg … move6_deg`"},
+    {Needs::moves, "`move1_deg … move6_deg`, all of them"},
+    {Needs::temperature, "`temp_c`"},
+    {Needs::time, "`time_s`"},
+});
+
+/// The test fails where the table has no text for the value.
+template <class Table, class Value>
+const char* text_in(const Table& table, Value value) {
+  const auto at = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.first == value; });
+  EXPECT_NE(at, table.end()) << static_cast<int>(value);
+  return at == table.end() ? "" : at->second;
 }
 
-std::string needs_text(Needs needs) {
-  switch (needs) {
-    case Needs::poses:
-      return "–";
-    case Needs::load:
-      return "`payload_kg`, or `fx_n fy_n fz_n`";
-    case Needs::direction:
-      return "`dir1 … dir6`, or `move1_deg … move6_deg`";
-    case Needs::moves:
-      return "`move1_deg … move6_deg`, all of them";
-    case Needs::temperature:
-      return "`temp_c`";
-    case Needs::time:
-      return "`time_s`";
-  }
-  return "";
+std::string basis_text(const Term<double>& t, const EffectId& id) {
+  const std::string order = id.order == 1 ? "" : fmt::format("{:g}·", id.order);
+  return fmt::format(fmt::runtime(text_in(bases, t.basis)), t.joint + 1, order, t.distal_joint + 1);
 }
 
 std::string bounds_text(const EffectBounds& b) {
@@ -129,7 +112,7 @@ std::string section(const EffectDescriptor& d, const Robot& robot) {
 }
 
 std::string generated() {
-  const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
+  const Robot& robot = support::tx60l();
   std::string text =
       "\n| effect | needs columns | bounds | least span | sent to the controller |\n|---|---|---|---|---|\n";
   for (const EffectDescriptor& d : all_effects()) {
@@ -137,7 +120,7 @@ std::string generated() {
     const std::string sent = belongs_to_measurement(d.effect) ? "no: of the measurement"
                              : d.effect == Effect::unnamed    ? "with `--allow-unnamed`"
                                                               : "yes";
-    text += fmt::format("| [`{0}`](#{0}) | {1} | {2} | {3} | {4} |\n", d.name, needs_text(d.needs),
+    text += fmt::format("| [`{0}`](#{0}) | {1} | {2} | {3} | {4} |\n", d.name, text_in(needed, d.needs),
                         bounds_text(bounds),
                         bounds.least_span > 0 ? fmt::format("{:g} K", bounds.least_span) : "–", sent);
   }
@@ -160,7 +143,7 @@ TEST(EffectsDocumentation, PageIsWhatTheDescriptorsSay) {
 
 TEST(EffectsDocumentation, EveryDescriptorIsComplete) {
   std::set<Effect> numbers;
-  const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
+  const Robot& robot = support::tx60l();
   for (const EffectDescriptor& d : all_effects()) {
     EXPECT_TRUE(numbers.insert(d.effect).second) << d.name;
     EXPECT_EQ(&descriptor(d.effect), &d);

@@ -4,26 +4,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "files/calibration_file.hpp"
-#include "files/robot_file.hpp"
-#include "flexcomp/forward.hpp"
 #include "model/host_model.hpp"
 #include "model/paper_model.hpp"
-#include "support/text_file.hpp"
+#include "support/moving_arm.hpp"
+#include "support/robot_files.hpp"
 
 namespace {
 
 using namespace flexcomp::host;
 using namespace flexcomp;
+using support::robot;
 using testing::ElementsAre;
-
-Robot robot(const std::string& name) {
-  return load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/" + name + ".yaml");
-}
 
 std::vector<std::string> names(const std::vector<Parameter>& parameters) {
   std::vector<std::string> list;
@@ -67,8 +62,8 @@ TEST(PaperModel, LeavesGravityOutWhereTheMountingForbidsIt) {
 }
 
 TEST(PaperModel, TheTruthOfTheFileIsTheSameModel) {
-  const Robot tx60l = robot("tx60l");
-  const Calibration truth = load_calibration(FLEXCOMP_SOURCE_DIR "/tests/data/tx60l_table1.yaml", tx60l);
+  const Robot& tx60l = support::tx60l();
+  const Calibration truth = load_calibration(support::data + "tx60l_table1.yaml", tx60l);
   std::vector<std::string> in_file = names(parameters_of(truth.terms, tx60l.nominal));
   std::vector<std::string> in_model = names(paper_model(tx60l.nominal, ModelKind::full, true).parameters);
   EXPECT_EQ(in_file, in_model);
@@ -84,7 +79,7 @@ std::vector<EffectId> one_of_each() {
 }
 
 TEST(Catalogue, EveryEffectGoesInAndComesBackByName) {
-  const Robot tx60l = robot("tx60l");
+  const Robot& tx60l = support::tx60l();
   ParametricModel model;
   std::vector<EffectId> ids = one_of_each();
   std::set<Effect> seen;
@@ -111,7 +106,7 @@ TEST(Catalogue, NamesAreTheContracts) {
 }
 
 TEST(Catalogue, ThermalGrowthDrivesEveryNominalLengthByOneNumber) {
-  const Robot tx60l = robot("tx60l");
+  const Robot& tx60l = support::tx60l();
   ParametricModel model;
   add_effect(model, EffectId{.effect = Effect::thermal_growth}, tx60l.nominal);
   ASSERT_EQ(model.parameters.size(), 1U);
@@ -123,29 +118,24 @@ TEST(Catalogue, ThermalGrowthDrivesEveryNominalLengthByOneNumber) {
   ParametricModel one;
   add_effect(one, forearm, tx60l.nominal);
   one.parameters[0].set(one.set, 12e-6);
-  const auto hot_model = prepare(one.set, tx60l, "test");
-  auto context = default_context<double>(tx60l.nominal);
-  Workspace<double, 6> ws;
-  const std::array<double, 6> q{};
-  const double cold = forward(*hot_model, q, context, ws).position.z();
-  context.temperature_c += 10;
-  EXPECT_NEAR(forward(*hot_model, q, context, ws).position.z() - cold, 54e-6, 1e-9);
+  support::MovingArm arm(tx60l, one.set);
+  const double cold = arm({}).position.z();
+  arm.context.temperature_c += 10;
+  EXPECT_NEAR(arm({}).position.z() - cold, 54e-6, 1e-9);
 }
 
 TEST(Catalogue, LinkGravityIsSineOfTheAnglesOnTheTx60l) {
-  const Robot tx60l = robot("tx60l");
+  const Robot& tx60l = support::tx60l();
   ParametricModel model;
   add_effect(model, EffectId{.effect = Effect::link_gravity}, tx60l.nominal);
   model.parameters[0].set(model.set, 1e-3);
-  const auto heavy = prepare(model.set, tx60l, "test");
-  const auto light = prepare({}, tx60l, "test");
-  const auto context = default_context<double>(tx60l.nominal);
-  Workspace<double, 6> ws;
+  const support::MovingArm heavy(tx60l, model.set);
+  const support::MovingArm light(tx60l);
   for (const double q2 : {-2.0, -0.5, 0.0, 0.7, 1.9}) {
     std::array<double, 6> q{0.3, q2, -0.4, 0.5, 0.6, 0.7};
-    const Pose<double> sagged = forward(*heavy, q, context, ws);
+    const Pose<double> sagged = heavy(q);
     q[1] += 1e-3 * std::sin(q2);
-    EXPECT_LT((sagged.position - forward(*light, q, context, ws).position).norm(), 1e-14);
+    EXPECT_LT((sagged.position - light(q).position).norm(), 1e-14);
   }
 }
 
@@ -177,12 +167,9 @@ TEST(Catalogue, TermsThatFitNoNameAreRefused) {
   TermSet odd = model.set;
   odd.terms[0].place.slot = slot::alpha;
   EXPECT_THROW(effects_of(odd, nominal), std::invalid_argument);
-  TermSet uneven;
-  {
-    ParametricModel thermal;
-    add_effect(thermal, EffectId{.effect = Effect::thermal_growth}, nominal);
-    uneven = thermal.set;
-  }
+  ParametricModel thermal;
+  add_effect(thermal, EffectId{.effect = Effect::thermal_growth}, nominal);
+  TermSet uneven = thermal.set;
   uneven.terms[1].coefficient = 1e-6;
   EXPECT_THROW(effects_of(uneven, nominal), std::invalid_argument);
 }
