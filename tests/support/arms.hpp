@@ -10,7 +10,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 #include <flexcomp/forward.hpp>
 #include <flexcomp/identification.hpp>
@@ -21,6 +25,13 @@ namespace arms {
 
 constexpr double deg = 3.14159265358979323846 / 180;  // rad
 constexpr double mm = 1e-3;                           // m
+
+/// Numbers of poses are divided by this: a sanitizer looks at every access, not at every pose.
+#if defined(__SANITIZE_ADDRESS__)
+constexpr int part = 20;
+#else
+constexpr int part = 1;
+#endif
 
 using Robot = flexcomp::NominalRobot<6>;
 using Joints = std::array<double, 6>;
@@ -101,6 +112,11 @@ class Random {
   }
   double around(double size) { return uniform(-size, size); }
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
+  std::vector<double> around(double size, std::size_t count) {
+    std::vector<double> v(count);
+    for (double& x : v) x = around(size);
+    return v;
+  }
 
   Joints pose(const Robot& robot) {
     Joints q{};
@@ -166,6 +182,30 @@ struct TermSet {
     return static_cast<std::uint16_t>(tables.size() - 1);
   }
 };
+
+/// The same commands for another scalar.
+template <class To, class From>
+inline std::array<To, 6> as(const std::array<From, 6>& from) {
+  std::array<To, 6> q;
+  for (std::size_t i = 0; i < 6; ++i) q[i] = static_cast<To>(from[i]);
+  return q;
+}
+
+/// The same context for another scalar.
+template <class To>
+inline flexcomp::Context<To> as(const flexcomp::Context<double>& from) {
+  flexcomp::Context<To> c;
+  c.payload_kg = static_cast<To>(from.payload_kg);
+  c.temperature_c = static_cast<To>(from.temperature_c);
+  c.time_s = static_cast<To>(from.time_s);
+  for (std::size_t k = 0; k < 3; ++k) {
+    c.payload_com_m[k] = static_cast<To>(from.payload_com_m[k]);
+    c.force_n[k] = static_cast<To>(from.force_n[k]);
+  }
+  c.direction = as<To>(from.direction);
+  c.relative_speed = as<To>(from.relative_speed);
+  return c;
+}
 
 /// The same list for another scalar.
 template <class To>
@@ -264,8 +304,7 @@ inline double curve_value(const std::vector<double>& coefficients, double q) {
 inline void add_joint_curves(TermSet<double>& set, Random& random, double amplitude_rad,
                              std::size_t size = 18) {
   for (std::size_t i = 0; i < 6; ++i) {
-    std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
+    std::vector<double> c = random.around(1, size);
     double largest = 0;
     for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(curve_value(c, k * 0.5 * deg)));
     for (double& v : c) v *= amplitude_rad / largest;
@@ -291,23 +330,52 @@ inline flexcomp::Context<double, 6> random_context(const Robot& robot, Random& r
   return c;
 }
 
+/// The model of a set that has to be accepted.
+template <class S, class Model = flexcomp::Model<S>>
+inline Model prepared(const Robot& robot, const TermSet<S>& set) {
+  Model model;
+  const flexcomp::Refusal refusal = model.prepare(robot, set.list());
+  if (refusal != flexcomp::Refusal::none)
+    throw std::logic_error("set refused: " + std::to_string(static_cast<int>(refusal)));
+  return model;
+}
+
+template <class Model>
+inline flexcomp::Linearisation<double> linearised(const Model& model, const Joints& q,
+                                                  const flexcomp::Context<double>& context) {
+  flexcomp::Linearisation<double> at;
+  flexcomp::linearise(model, q, context, at);
+  return at;
+}
+
+template <class Model>
+inline flexcomp::Pose<double> forward(const Model& model, const Joints& q,
+                                      const flexcomp::Context<double>& context) {
+  flexcomp::Workspace<double> ws;
+  return flexcomp::forward(model, q, context, ws);
+}
+
 /// The nominal Jacobian at the origin of Ftool, in F0: rows m, then rad. (kdl_test judges these screws.)
 class NominalJacobian {
  public:
   using Matrix = Eigen::Matrix<double, 6, 6>;
 
-  explicit NominalJacobian(const Robot& robot) : context_(flexcomp::default_context<double>(robot)) {
-    model_.begin(robot);
-    model_.finish();
-  }
+  explicit NominalJacobian(const Robot& robot)
+      : model_(prepared(robot, TermSet<double>())), context_(flexcomp::default_context<double>(robot)) {}
 
   Matrix operator()(const Joints& q) const {
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model_, q, context_, at);
+    const flexcomp::Linearisation<double> at = linearised(model_, q, context_);
     Matrix j;
     for (std::size_t i = 0; i < 6; ++i)
       j.col(static_cast<int>(i)) = flexcomp::screw(model_, at, on_link(i + 1, flexcomp::slot::theta));
     return j;
+  }
+
+  /// Whether the smallest singular value (m, rad) is at least 0.1.
+  bool is_regular(const Joints& q) const {
+    const Matrix j = (*this)(q);
+    return Eigen::SelfAdjointEigenSolver<Matrix>(j * j.transpose(), Eigen::EigenvaluesOnly)
+               .eigenvalues()[0] >= 0.01;
   }
 
  private:
