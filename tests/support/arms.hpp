@@ -238,16 +238,22 @@ inline flexcomp::Place on_tool(std::uint8_t slot) { return {flexcomp::body::tool
 inline flexcomp::Place on_load(std::uint8_t slot) { return {flexcomp::body::load, slot}; }
 inline flexcomp::Place on_point(std::uint8_t slot) { return {flexcomp::body::point, slot}; }
 
+/// Table 1 of the paper by joint, its stiffness read as N·mm/rad; base as x y z rx ry rz, m and rad.
+namespace of_table1 {
+constexpr double theta[6] = {-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};   // deg
+constexpr double d[6] = {-0.4, 0, 0.2, -0.1, 0.1, -0.3};              // mm
+constexpr double a[6] = {0.09, -0.05, -0.1, 0.06, -0.08, 0.03};       // mm
+constexpr double alpha[6] = {0.03, 0.02, -0.05, -0.008, 0.01, 0.07};  // deg
+constexpr double base[6] = {0.3 * mm, -0.2 * mm, 0.1 * mm, 0.02 * deg, 0.01 * deg, 0.01 * deg};
+constexpr double stiffness[6] = {1.47e10, 6.67e7, 3.13e7, 2.22e7, 1.18e6, 7.69e5};  // N·mm/rad
+}  // namespace of_table1
+
 /// The rigid half of Table 1 times `scale`. A link whose axis is parallel to the next one takes beta for d.
 inline TermSet<double> table1_geometry(const Arm& arm, double scale = 1) {
   using flexcomp::Basis;
   namespace slot = flexcomp::slot;
   TermSet<double> set;
-  const double theta[6] = {-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};   // deg
-  const double d[6] = {-0.4, 0, 0.2, -0.1, 0.1, -0.3};              // mm
-  const double a[6] = {0.09, -0.05, -0.1, 0.06, -0.08, 0.03};       // mm
-  const double alpha[6] = {0.03, 0.02, -0.05, -0.008, 0.01, 0.07};  // deg
-  const double base[6] = {0.3 * mm, -0.2 * mm, 0.1 * mm, 0.02 * deg, 0.01 * deg, 0.01 * deg};
+  using namespace of_table1;
   for (std::size_t i = 0; i < 6; ++i) {
     const bool parallel = i == 1 || (i == 2 && arm.parallel_3);
     set.add(on_link(i + 1, slot::theta), Basis::one, scale * theta[i] * deg);
@@ -266,10 +272,9 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
   using flexcomp::Effect;
   namespace slot = flexcomp::slot;
   TermSet<double> set = table1_geometry(arm, scale);
-  const double stiffness[6] = {1.47e10, 6.67e7, 3.13e7, 2.22e7, 1.18e6, 7.69e5};  // N·mm/rad
   for (std::size_t i = 0; i < 6; ++i) {
     flexcomp::Term<double>& t =
-        set.add(on_link(i + 1, slot::theta), Basis::load_torque, scale * 1e3 / stiffness[i], i);
+        set.add(on_link(i + 1, slot::theta), Basis::load_torque, scale * 1e3 / of_table1::stiffness[i], i);
     t.effect = Effect::joint_compliance;
     t.instance = static_cast<std::uint16_t>(i);
   }
