@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "commands/diagnosis_text.hpp"
+#include "commands/result_text.hpp"
 #include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/effect_profile.hpp"
 #include "diagnosis/held_out.hpp"
