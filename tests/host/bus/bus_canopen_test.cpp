@@ -14,7 +14,6 @@
 #include <thread>
 #include <utility>
 
-#include "bus/canopen_client.hpp"
 #include "bus/sdo_client.hpp"
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
