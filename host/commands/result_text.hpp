@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Results as text for the terminal. Each is made in its own file: RESULT_text.cpp; errors before and after, which identify,
-/// validate and diagnose show, in accuracy.cpp.
+/// Results as text for the terminal. Each kind of result has a source of its own beside this header; errors before and after,
+/// which identify, validate and diagnose show, are in accuracy.cpp.
 #ifndef FLEXCOMP_HOST_COMMANDS_RESULT_TEXT_HPP
 #define FLEXCOMP_HOST_COMMANDS_RESULT_TEXT_HPP
 

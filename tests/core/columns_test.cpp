@@ -166,7 +166,7 @@ TEST(ExactColumn, CurveCoefficientsAreDualToo) {
         derivative(flexcomp::forward(dual, arms::as<Jet>(q), arms::as<Jet>(context), ws));
     const auto model = arms::prepared(arm.robot, set);
     const auto at = arms::linearised(model, q, context);
-    const double weight = arms::cardinal_spline(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
+    const double weight = plain::cardinal_spline(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
     const Vector6<double> got = flexcomp::screw(model, at, arms::on_link(3, flexcomp::slot::theta)) * weight;
     ASSERT_LE((got - expected).norm(), 1e-12);
   }

@@ -133,8 +133,7 @@ TEST(JointDeflection, ExpandedCurveMatchesTheSpline) {
       detail::Expansion<double> at{0, 0, 0};
       detail::expand_curve(model, t, q, 1.0, at);
       const double h = 1e-4 / static_cast<double>(size);
-      const double left = arms::curve_value(c, q - h), here = arms::curve_value(c, q),
-                   right = arms::curve_value(c, q + h);
+      const double left = plain::curve(c, q - h), here = plain::curve(c, q), right = plain::curve(c, q + h);
       value = std::max(value, std::abs(at.value - here));
       const double m = static_cast<double>(size);
       slope = std::max(slope, std::abs(at.slope - (right - left) / (2 * h)) / m);

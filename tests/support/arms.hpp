@@ -21,6 +21,8 @@
 #include <flexcomp/robot.hpp>
 #include <flexcomp/term.hpp>
 
+#include "support/plain_arm.hpp"
+
 namespace arms {
 
 constexpr double deg = 3.14159265358979323846 / 180;  // rad
@@ -284,34 +286,13 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
   return set;
 }
 
-/// The cardinal cubic B-spline centred at 0 (de Boor), written apart from the core.
-inline double cardinal_spline(double x) {
-  x = std::abs(x);
-  if (x < 1) return 2.0 / 3 - x * x + x * x * x / 2;
-  return x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
-}
-
-/// The curve of a set of coefficients at reading q (rad), as docs/model.md, M6 defines it.
-inline double curve_value(const std::vector<double>& coefficients, double q) {
-  const double m = static_cast<double>(coefficients.size());
-  const double pi = 3.14159265358979323846;
-  double sum = 0;
-  for (std::size_t k = 0; k < coefficients.size(); ++k) {
-    // The nearest of the images of knot k, one turn apart.
-    double x = m * q / (2 * pi) - static_cast<double>(k);
-    x -= m * std::round(x / m);
-    sum += coefficients[k] * cardinal_spline(x);
-  }
-  return sum;
-}
-
 /// Adds a random curve of `size` coefficients on every joint, each reaching exactly +-amplitude_rad.
 inline void add_joint_curves(TermSet<double>& set, Random& random, double amplitude_rad,
                              std::size_t size = 18) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::vector<double> c = random.around(1, size);
     double largest = 0;
-    for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(curve_value(c, k * 0.5 * deg)));
+    for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(plain::curve(c, k * 0.5 * deg)));
     for (double& v : c) v *= amplitude_rad / largest;
     const std::uint16_t table = set.add_curve(c);
     flexcomp::Term<double>& t =

@@ -5,7 +5,6 @@
 #define FLEXCOMP_TESTS_SUPPORT_PLAIN_CASE_HPP
 
 #include "support/arms.hpp"
-#include "support/plain_arm.hpp"
 
 namespace plain {
 
