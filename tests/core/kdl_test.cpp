@@ -16,7 +16,6 @@ namespace {
 using arms::Joints;
 using arms::Robot;
 using flexcomp::Basis;
-using flexcomp::Model;
 
 constexpr double bound = 1e-12;  // m and rad
 

@@ -255,16 +255,16 @@ inline TermSet<double> table1_geometry(const Arm& arm, double scale = 1) {
   using flexcomp::Basis;
   namespace slot = flexcomp::slot;
   TermSet<double> set;
-  using namespace of_table1;
+  namespace t1 = of_table1;
   for (std::size_t i = 0; i < 6; ++i) {
     const bool parallel = i == 1 || (i == 2 && arm.parallel_3);
-    set.add(on_link(i + 1, slot::theta), Basis::one, scale * theta[i] * deg);
-    if (!parallel) set.add(on_link(i + 1, slot::d), Basis::one, scale * d[i] * mm);
-    set.add(on_link(i + 1, slot::a), Basis::one, scale * a[i] * mm);
-    set.add(on_link(i + 1, slot::alpha), Basis::one, scale * alpha[i] * deg);
+    set.add(on_link(i + 1, slot::theta), Basis::one, scale * t1::theta[i] * deg);
+    if (!parallel) set.add(on_link(i + 1, slot::d), Basis::one, scale * t1::d[i] * mm);
+    set.add(on_link(i + 1, slot::a), Basis::one, scale * t1::a[i] * mm);
+    set.add(on_link(i + 1, slot::alpha), Basis::one, scale * t1::alpha[i] * deg);
     if (parallel) set.add(on_link(i + 1, slot::beta), Basis::one, scale * 0.03 * deg);
   }
-  for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::one, scale * base[k]);
+  for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::one, scale * t1::base[k]);
   return set;
 }
 

@@ -149,18 +149,18 @@ Session draw_session(const Case& c, Random& random) {
 
 /// Errors like those of Table 1, each scaled at random and of random sign.
 void draw_rigid_arm(Case& c, Random& random) {
-  using namespace arms::of_table1;
+  namespace t1 = arms::of_table1;
   const auto scaled = [&](double size) { return size * random.signed_size(0.5, 1.5); };
   for (std::size_t i = 0; i < 6; ++i) {
     const bool parallel = i == 1 || (i == 2 && arms::all()[c.arm].parallel_3);
     plain::Link& l = c.truth.geometric[i];
-    l.theta = scaled(theta[i]) * arms::deg;
-    l.a = scaled(a[i]) * arms::mm;
-    l.alpha = scaled(alpha[i]) * arms::deg;
+    l.theta = scaled(t1::theta[i]) * arms::deg;
+    l.a = scaled(t1::a[i]) * arms::mm;
+    l.alpha = scaled(t1::alpha[i]) * arms::deg;
     if (parallel) {
       l.beta = scaled(0.03) * arms::deg;
     } else {
-      l.d = scaled(d[i]) * arms::mm;
+      l.d = scaled(t1::d[i]) * arms::mm;
     }
   }
   c.truth.base = {scaled(0.3) * arms::mm,   scaled(0.2) * arms::mm,   scaled(0.1) * arms::mm,
