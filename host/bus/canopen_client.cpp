@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bus/canopen_client.hpp"
-
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -17,6 +15,7 @@
 #include <thread>
 #include <utility>
 
+#include "bus/controller_client.hpp"
 #include "bus/descriptor.hpp"
 #include "bus/sdo_client.hpp"
 #include "flexcomp/bytes.hpp"
@@ -31,8 +30,6 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 std::string reason(int error) { return std::generic_category().message(error); }
-
-double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
 
 Descriptor open_can(const std::string& interface, unsigned node, const std::string& where) {
   Descriptor out(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
@@ -74,7 +71,7 @@ Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, con
     if (steady_clock::now() > end) {
       throw BusError(where,
                      fmt::format("another program on this machine has been talking to node {} for {:.1f} s",
-                                 can.node, seconds(options.response_timeout)));
+                                 can.node, in_seconds(options.response_timeout)));
     }
     std::this_thread::sleep_for(milliseconds(20));
   }
@@ -167,7 +164,7 @@ class CanopenClient final : public ControllerClient {
             where(),
             fmt::format("node {} did not answer when asked {} object {} ({} of {:.2f} s): {}", node_, what,
                         object.text(), times == 1 ? "one wait" : fmt::format("{} waits", times),
-                        seconds(timeout_), e.what()));
+                        in_seconds(timeout_), e.what()));
       } catch (const std::system_error& e) {
         throw BusError(where(), fmt::format("{}", e.what()));
       }

@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <map>
 #include <thread>
-#include <utility>
 
-#include "bus/canopen_client.hpp"
-#include "bus/modbus_client.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 
 namespace flexcomp::host {
@@ -47,53 +45,38 @@ bool took_effect(wire::Command command, const wire::Status& before, const wire::
 }  // namespace
 
 std::string describe(wire::Command command) {
-  switch (command) {
-    case wire::Command::begin:
-      return "announce a set";
-    case wire::Command::verify:
-      return "verify the set";
-    case wire::Command::commit:
-      return "commit the set";
-    case wire::Command::commit_trial:
-      return "commit the set on trial";
-    case wire::Command::confirm:
-      return "confirm the set on trial";
-    case wire::Command::rollback:
-      return "roll back";
-    case wire::Command::abort:
-      return "drop what is staged";
-    case wire::Command::restore_defaults:
-      return "erase both sets";
-    case wire::Command::none:
-      break;
-  }
-  return "nothing";
+  static const std::map<wire::Command, const char*> words{
+      {wire::Command::begin, "announce a set"},
+      {wire::Command::verify, "verify the set"},
+      {wire::Command::commit, "commit the set"},
+      {wire::Command::commit_trial, "commit the set on trial"},
+      {wire::Command::confirm, "confirm the set on trial"},
+      {wire::Command::rollback, "roll back"},
+      {wire::Command::abort, "drop what is staged"},
+      {wire::Command::restore_defaults, "erase both sets"}};
+  const auto known = words.find(command);
+  return known == words.end() ? "nothing" : known->second;
 }
 
 std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail) {
   if (answer != wire::Answer::refused) return wire::text(answer);
-  std::string out = text(refusal);
+  const std::string why = text(refusal);
   switch (refusal) {
     case Refusal::unknown_basis:
-      out += fmt::format(" (basis {})", detail);
-      break;
+      return fmt::format("{} (basis {})", why, detail);
     case Refusal::too_long:
-      out += fmt::format(" (of {} bytes)", detail);
-      break;
+      return fmt::format("{} (of {} bytes)", why, detail);
     case Refusal::stale_sequence:
-      out += fmt::format(" ({})", detail);
-      break;
+      return fmt::format("{} ({})", why, detail);
     case Refusal::implausible:
-      out += fmt::format(" (by {:.3f} mm or mrad)", detail / 1000.0);
-      break;
+      return fmt::format("{} (by {:.3f} mm or mrad)", why, detail / 1000.0);
     default:
-      break;
+      return why;
   }
-  return out;
 }
 
-ControllerClient::ControllerClient(BusAddress address, const ClientOptions& options)
-    : address_(std::move(address)), options_(options), where_(address_.text()) {}
+ControllerClient::ControllerClient(const BusAddress& address, const ClientOptions& options)
+    : options_(options), where_(address.text()) {}
 
 void ControllerClient::read_capability() {
   Bytes bytes;
@@ -170,7 +153,7 @@ void ControllerClient::run(wire::Command command, std::uint32_t argument) {
     if (steady_clock::now() > end) {
       throw NoAnswer(
           where_, fmt::format("asked to {}, the controller is still writing its memory after {:.1f} s", what,
-                              static_cast<double>(options_.write_timeout.count()) / 1000));
+                              in_seconds(options_.write_timeout)));
     }
     std::this_thread::sleep_for(polling_interval);
   }
@@ -244,7 +227,7 @@ void ControllerClient::throw_refusal(const std::string& request, const BusRefusa
     throw RefusedByController(
         where_,
         fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
-                    request, static_cast<double>(options_.response_timeout.count()) / 1000, from_bus.code),
+                    request, in_seconds(options_.response_timeout), from_bus.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(

@@ -24,6 +24,9 @@ namespace flexcomp::host {
 
 using Bytes = std::vector<std::uint8_t>;
 
+/// For messages.
+inline double in_seconds(std::chrono::milliseconds t) { return std::chrono::duration<double>(t).count(); }
+
 /// Reports bytes transferred so far.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
@@ -95,7 +98,7 @@ class ControllerClient {
     std::string code;  ///< number and text
   };
 
-  ControllerClient(BusAddress address, const ClientOptions& options);
+  ControllerClient(const BusAddress& address, const ClientOptions& options);
 
   /// Reads the capability record and refuses an unknown protocol. To be called once the bus is open.
   void read_capability();
@@ -108,7 +111,6 @@ class ControllerClient {
   virtual Bytes read_image(std::size_t size, const Progress& progress) = 0;
   virtual Bytes exchange_probe(std::span<const std::uint8_t> request) = 0;
 
-  const BusAddress& address() const { return address_; }
   const ClientOptions& options() const { return options_; }
 
  private:
@@ -116,7 +118,6 @@ class ControllerClient {
   void retry_while_busy(const std::string& request, const Action& action);
   [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& refusal);
 
-  BusAddress address_;
   ClientOptions options_;
   std::string where_;
   wire::Capability capability_;
@@ -124,6 +125,18 @@ class ControllerClient {
 
 /// Opens the bus and reads the capability of the controller. \throws BusError
 std::unique_ptr<ControllerClient> connect(const BusAddress& address, const ClientOptions& options = {});
+
+/// Connects to a node over SocketCAN: objects of flexcomp/wire/canopen_objects.hpp by SDO (CiA 301, 7.2.4).
+/// \param address  holds a CanAddress \throws BusError
+std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options);
+
+/// Connects over an open socket of struct can_frame, which the client owns and closes.
+std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options,
+                                                  int socket);
+
+/// Connects to a unit over Modbus TCP or RTU, by libmodbus: registers of flexcomp/wire/modbus_map.hpp.
+/// \param address  holds a ModbusTcpAddress or a ModbusRtuAddress \throws BusError
+std::unique_ptr<ControllerClient> connect_modbus(const BusAddress& address, const ClientOptions& options);
 
 /// Text of a command for messages: "commit the set".
 std::string describe(wire::Command command);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bus/modbus_client.hpp"
-
 #include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <netdb.h>
@@ -12,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "bus/controller_client.hpp"
 #include "flexcomp/wire/modbus_map.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 
@@ -189,9 +188,8 @@ class ModbusClient final : public ControllerClient {
     const auto end = steady_clock::now() + options().response_timeout;
     while (flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
       if (steady_clock::now() > end) {
-        throw BusError(
-            where(), fmt::format("another program on this machine has been using {} for {:.1f} s", rtu.device,
-                                 static_cast<double>(options().response_timeout.count()) / 1000));
+        throw BusError(where(), fmt::format("another program on this machine has been using {} for {:.1f} s",
+                                            rtu.device, in_seconds(options().response_timeout)));
       }
       std::this_thread::sleep_for(milliseconds(20));
     }
@@ -199,13 +197,19 @@ class ModbusClient final : public ControllerClient {
 
   [[noreturn]] void fail_to_open(int error) const {
     if (error == ETIMEDOUT) {
-      throw NoAnswer(where(), fmt::format("no connection within {:.1f} s", seconds(timeout_)));
+      throw NoAnswer(where(), fmt::format("no connection within {:.1f} s", in_seconds(timeout_)));
     }
     throw BusError(where(), fmt::format("cannot be opened: {}", modbus_strerror(error)),
                    ErrorCode::bus_not_opened);
   }
 
-  static double seconds(milliseconds t) { return static_cast<double>(t.count()) / 1000; }
+  /// What the exceptions of a controller mean.
+  inline static const std::vector<std::pair<int, BusRefusal>> refusals{
+      {EMBXSBUSY, {true, false, "Modbus exception 06, server device busy"}},
+      {EMBXILADD, {false, true, "Modbus exception 02, no such register"}},
+      {EMBXILFUN, {false, true, "Modbus exception 01, no such function"}},
+      {EMBXILVAL, {false, false, "Modbus exception 03, illegal value"}},
+      {EMBXSFAIL, {false, false, "Modbus exception 04, server device failure"}}};
 
   /// One request. Exceptions of the controller become BusRefusal, a time-out NoAnswer.
   template <class Request>
@@ -216,23 +220,12 @@ class ModbusClient final : public ControllerClient {
       if (attempt != 0) modbus_flush(context_.get());
       if (request() >= 0) return;
       error = errno;
-      switch (error) {
-        case EMBXSBUSY:
-          throw BusRefusal{true, false, "Modbus exception 06, server device busy"};
-        case EMBXILADD:
-          throw BusRefusal{false, true, "Modbus exception 02, no such register"};
-        case EMBXILFUN:
-          throw BusRefusal{false, true, "Modbus exception 01, no such function"};
-        case EMBXILVAL:
-          throw BusRefusal{false, false, "Modbus exception 03, illegal value"};
-        case EMBXSFAIL:
-          throw BusRefusal{false, false, "Modbus exception 04, server device failure"};
-        case EMBXGPATH:
-        case EMBXGTAR:
-          throw BusError(where(),
-                         fmt::format("the gateway cannot reach unit {} ({})", unit_, modbus_strerror(error)));
-        default:
-          break;
+      for (const auto& [exception, refusal] : refusals) {
+        if (error == exception) throw refusal;
+      }
+      if (error == EMBXGPATH || error == EMBXGTAR) {
+        throw BusError(where(),
+                       fmt::format("the gateway cannot reach unit {} ({})", unit_, modbus_strerror(error)));
       }
       // A damaged or missing answer is worth another attempt, a broken connection is not.
       const bool damaged = error == ETIMEDOUT || (error >= EMBBADCRC && error < EMBBADCRC + 8);
@@ -242,7 +235,7 @@ class ModbusClient final : public ControllerClient {
       throw NoAnswer(
           where(),
           fmt::format("unit {} did not answer when asked {} ({} of {:.1f} s)", unit_, what,
-                      attempts == 1 ? "one wait" : fmt::format("{} waits", attempts), seconds(timeout_)));
+                      attempts == 1 ? "one wait" : fmt::format("{} waits", attempts), in_seconds(timeout_)));
     }
     throw BusError(where(), fmt::format("asked {}, unit {}: {}", what, unit_, modbus_strerror(error)));
   }

@@ -83,16 +83,17 @@ void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
   frame[3] = object.sub;
 }
 
-}  // namespace
-
-std::string ObjectAddress::text() const { return fmt::format("0x{:04X}:{}", index, sub); }
-
+/// CiA 301, table 22: "SDO abort 0604 0043, general parameter incompatibility".
 std::string abort_text(std::uint32_t code) {
   const auto* const known = std::find_if(abort_codes.begin(), abort_codes.end(),
                                          [code](const AbortCode& entry) { return entry.code == code; });
   return fmt::format("SDO abort {:04X} {:04X}, {}", code >> 16U, code & 0xFFFFU,
                      known != abort_codes.end() ? known->text : "unknown abort code");
 }
+
+}  // namespace
+
+std::string ObjectAddress::text() const { return fmt::format("0x{:04X}:{}", index, sub); }
 
 SdoAbort::SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server)
     : std::runtime_error(fmt::format("{} at {}{}", abort_text(code), object.text(),

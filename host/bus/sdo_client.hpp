@@ -40,9 +40,6 @@ class SdoTimeout : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Text of an abort code (CiA 301, table 22): "SDO abort 0604 0043, general parameter incompatibility".
-std::string abort_text(std::uint32_t code);
-
 class SdoClient {
  public:
   using Progress = std::function<void(std::size_t done, std::size_t total)>;

@@ -41,8 +41,8 @@ struct Requirements {
 
 std::string short_hex(const Sha256Digest& digest) { return hex(digest).substr(0, 12) + "…"; }
 
-}  // namespace
-
+/// Lists the requirements of a well-formed image (schema, bases, capacities) that a controller does not meet,
+/// one sentence without full stop each. The robot that the image is bound to is not compared.
 std::vector<std::string> beyond_capability(const wire::Capability& capability,
                                            std::span<const std::uint8_t> image) {
   std::vector<std::string> out;
@@ -70,6 +70,8 @@ std::vector<std::string> beyond_capability(const wire::Capability& capability,
   require(image.size(), capability.image_bytes, "bytes");
   return out;
 }
+
+}  // namespace
 
 std::uint32_t next_sequence(ControllerClient& client) {
   const wire::Status now = client.status();

@@ -17,12 +17,8 @@
 
 namespace flexcomp::host {
 
-/// Lists the requirements of a well-formed image (schema, bases, capacities) that a controller does not meet,
-/// one sentence without full stop each. The robot that the image is bound to is not compared.
-std::vector<std::string> beyond_capability(const wire::Capability& capability,
-                                           std::span<const std::uint8_t> image);
-
-/// \throws BusError  naming what of the image of `source` is beyond_capability()
+/// Compares what an image of `source` requires (schema, bases, capacities) with the controller's capability.
+/// \throws BusError  naming what the controller does not have
 void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
                               std::span<const std::uint8_t> image);
 

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "commands/numbers.hpp"
+#include "commands/common_options.hpp"
 
 namespace flexcomp::host {
 

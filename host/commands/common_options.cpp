@@ -4,12 +4,47 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
 
 #include "commands/colour.hpp"
 #include "files/write_file.hpp"
 #include "json.hpp"
+#include "units.hpp"
 
 namespace flexcomp::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool same_file(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) return false;
+  std::error_code error;
+  const fs::file_status status = fs::status(a, error);
+  if (fs::exists(status)) return fs::is_regular_file(status) && fs::equivalent(a, b, error) && !error;
+  // What is not there yet is where it will be written.
+  try {
+    return written_path(a) == written_path(b);
+  } catch (const std::runtime_error&) {
+    return false;  // cannot be written at all, which is said when it is
+  }
+}
+
+CLI::Validator number_that(const std::function<bool(double)>& fits, const std::string& expected,
+                           const std::string& in_help) {
+  return {[fits, expected](const std::string& text) {
+            // The same reader as for files: it takes no "nan", no "inf" and nothing that overflows. Blanks stand before
+            // numbers in a list, "1, 2, 3".
+            const auto value = parse_si(CLI::detail::trim_copy(text), unit::si);
+            return value && fits(*value) ? std::string()
+                                         : fmt::format("expected {}, found '{}'", expected, text);
+          },
+          in_help};
+}
+
+}  // namespace
 
 void CommonOptions::add_to(CLI::App& app) {
   app.add_option("--json", json, "Write the machine-readable result to FILE")->type_name("FILE");
@@ -49,6 +84,42 @@ void add_robot_option(CLI::App& app, std::string& path) {
 CLI::Option* add_force_option(CLI::App& app, bool& force) {
   return app.add_flag("--force", force,
                       "Go on where input is only suspicious (readings that look like radians)");
+}
+
+void refuse_same_file(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    const NamedFile& out = outputs[k];
+    for (const NamedFile& in : inputs) {
+      if (same_file(out.path, in.path)) {
+        throw CLI::ValidationError(
+            out.option, fmt::format("{} is read as {}: give another file to write", out.path, in.option));
+      }
+    }
+    for (std::size_t other = 0; other < k; ++other) {
+      if (same_file(out.path, outputs[other].path)) {
+        throw CLI::ValidationError(out.option, fmt::format("{} is written as {} already: give another file",
+                                                           out.path, outputs[other].option));
+      }
+    }
+  }
+}
+
+CLI::Validator finite_number() {
+  return number_that([](double) { return true; }, "a finite number", "");
+}
+
+CLI::Validator positive_number() {
+  return number_that([](double value) { return value > 0; }, "a finite number above 0", "POSITIVE");
+}
+
+CLI::Validator non_negative_number() {
+  return number_that([](double value) { return value >= 0; }, "a finite number, 0 or more", "NONNEGATIVE");
+}
+
+CLI::Validator number_between(double low, double high) {
+  return number_that([low, high](double value) { return value >= low && value <= high; },
+                     fmt::format("a number from {:g} to {:g}", low, high),
+                     fmt::format("FLOAT in [{:g} - {:g}]", low, high));
 }
 
 }  // namespace flexcomp::host

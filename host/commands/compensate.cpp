@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "commands/answers.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/outputs.hpp"
 #include "commands/program_targets.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
@@ -67,34 +65,27 @@ void Compensate::run() {
 }  // namespace
 
 void add_compensate(CLI::App& app) {
-  auto options = std::make_shared<Compensate>();
-  CLI::App* command = app.add_subcommand(
-      "compensate", "Corrected joint commands for targets, as the controller would give them");
-  add_robot_option(*command, options->robot);
-  command->add_option("--calibration", options->calibration, "Calibration file")
-      ->type_name("CAL.yaml")
+  auto [command, options] = add_command<Compensate>(
+      app, "compensate", "Corrected joint commands for targets, as the controller would give them");
+  add_robot_option(command, options.robot);
+  add_value(command, "--calibration", options.calibration, "CAL.yaml", "Calibration file")->required();
+  add_value(
+      command, "--targets", options.targets, "FILE",
+      "Targets: q1_deg … q6_deg [deg], or a pose of Ftool in F0 (x_mm y_mm z_mm qw qx qy qz) with "
+      "seed1_deg … seed6_deg; context columns as in data files. Or a program: KUKA .src .dat, ABB .mod, "
+      "Stäubli .dtx")
       ->required();
-  command
-      ->add_option(
-          "--targets", options->targets,
-          "Targets: q1_deg … q6_deg [deg], or a pose of Ftool in F0 (x_mm y_mm z_mm qw qx qy qz) with "
-          "seed1_deg … seed6_deg; context columns as in data files. Or a program: KUKA .src .dat, ABB .mod, "
-          "Stäubli .dtx")
-      ->type_name("FILE")
+  add_value(
+      command, "-o,--output", options.out, "FILE",
+      "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status (ok "
+      "near_singular limited at_limit no_set refused); of a program, the program with its targets "
+      "corrected")
       ->required();
-  command
-      ->add_option(
-          "-o,--output", options->out,
-          "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status (ok "
-          "near_singular limited at_limit no_set refused); of a program, the program with its targets "
-          "corrected")
-      ->type_name("FILE")
-      ->required();
-  options->programs.add_to(*command);
-  command->add_flag("--allow-unnamed", options->allow_unnamed, "Also use what was found but not understood");
-  add_force_option(*command, options->force);
-  options->common.add_to(*command);
-  command->footer(
+  options.programs.add_to(command);
+  command.add_flag("--allow-unnamed", options.allow_unnamed, "Also use what was found but not understood");
+  add_force_option(command, options.force);
+  options.common.add_to(command);
+  command.footer(
       "Examples:\n"
       "  flexcomp compensate --robot tx60l.yaml --calibration cal.yaml --targets t.csv -o corrected.csv\n"
       "  flexcomp compensate --robot kr6.yaml --calibration kr6_cal.yaml --targets weld.src --start "
@@ -102,7 +93,6 @@ void add_compensate(CLI::App& app) {
       "A program's poses are of the robot file's tool, in the frame of --frame [default: F0]. Its bytes "
       "stay, but for the "
       "targets' numbers.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

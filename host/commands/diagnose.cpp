@@ -3,16 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <string>
 
-#include "commands/accuracy.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/diagnosis_text.hpp"
-#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
+#include "commands/result_text.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/held_out.hpp"
@@ -124,42 +121,31 @@ void Diagnose::run() const {
 }  // namespace
 
 void add_diagnose(CLI::App& app) {
-  auto options = std::make_shared<Diagnose>();
-  CLI::App* command = app.add_subcommand(
-      "diagnose", "Where model and measurement still disagree: find the missing effect, name it, add it");
-  add_robot_option(*command, options->robot);
-  command
-      ->add_option("--calibration", options->calibration,
-                   "Where to start; without it the full model is identified first")
-      ->type_name("CAL.yaml");
-  command
-      ->add_option(
-          "--data", options->data,
-          "Measured data [deg, mm], with context where it was recorded: payload_kg, move1_deg … or dir1 …, "
-          "temp_c, time_s")
-      ->type_name("D.csv")
+  auto [command, options] = add_command<Diagnose>(
+      app, "diagnose",
+      "Where model and measurement still disagree: find the missing effect, name it, add it");
+  add_robot_option(command, options.robot);
+  add_value(command, "--calibration", options.calibration, "CAL.yaml",
+            "Where to start; without it the full model is identified first");
+  add_value(command, "--data", options.data, "D.csv",
+            "Measured data [deg, mm], with context where it was recorded: payload_kg, move1_deg … or dir1 …, "
+            "temp_c, time_s")
       ->required();
-  command
-      ->add_option("--holdout", options->holdout,
-                   "Other measured rows: how far the gap shrinks there. Changes nothing else")
-      ->type_name("H.csv");
-  command->add_option("-o,--output", options->out, "Calibration file with what was found")
-      ->type_name("CAL2.yaml")
+  add_value(command, "--holdout", options.holdout, "H.csv",
+            "Other measured rows: how far the gap shrinks there. Changes nothing else");
+  add_value(command, "-o,--output", options.out, "CAL2.yaml", "Calibration file with what was found")
       ->required();
-  command
-      ->add_option("--plan", options->plan,
-                   "Where two names fit equally well: poses that would tell them apart (as plan writes them)")
-      ->type_name("POSES.csv");
-  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
-  add_force_option(*command, options->force);
-  options->common.add_seed_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+  add_value(command, "--plan", options.plan, "POSES.csv",
+            "Where two names fit equally well: poses that would tell them apart (as plan writes them)");
+  add_value(command, "--report", options.report, "F.html", "Self-contained page of the result");
+  add_force_option(command, options.force);
+  options.common.add_seed_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp diagnose --robot tx60l.yaml --calibration cal.yaml --data measured.csv --holdout "
       "others.csv -o cal2.yaml\n"
       "Every verdict is exit status 0. Exit status 5: the files were written, but the error did not shrink "
       "or chi-square says that the noise is smaller than was declared.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "commands/diagnosis_text.hpp"
+#include "commands/result_text.hpp"
 
 #include <fmt/format.h>
 

@@ -3,12 +3,10 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/outputs.hpp"
 #include "exchange/bus_files.hpp"
 #include "exchange/corrected_urdf.hpp"
 #include "exchange/robot_header.hpp"
@@ -147,9 +145,8 @@ void Export::modbus_map() const {
 }  // namespace
 
 void add_export(CLI::App& app) {
-  auto options = std::make_shared<Export>();
-  CLI::App* command = app.add_subcommand(
-      "export",
+  auto [command, options] = add_command<Export>(
+      app, "export",
       "Robot, calibration and bus maps in the words of other programs.\n"
       "c: the nominal robot as a header for a controller's build. A parameter set is accepted only where "
       "the controller has the\n"
@@ -159,29 +156,22 @@ void add_export(CLI::App& app) {
       "cannot hold is said in mm.\n"
       "eds: electronic data sheet (CiA 306) of the CANopen node.\n"
       "modbus: the register map, as .csv, .json or .md.");
-  command->add_option("--as", options->format, "Format")
+  command.add_option("--as", options.format, "Format")
       ->required()
       ->check(CLI::IsMember({"c", "urdf", "eds", "modbus"}));
-  command->add_option("--robot", options->robot, "Robot file (c, urdf)")->type_name("ROBOT.yaml");
-  command->add_option("--calibration", options->calibration, "Calibration file (urdf)")
-      ->type_name("CAL.yaml");
-  command->add_option("--urdf", options->urdf, "URDF of the same arm, whose joints are corrected (urdf)")
-      ->type_name("ARM.urdf");
-  command
-      ->add_option("--base", options->links.base,
-                   "Link of the URDF that is the base [default: the root link]")
-      ->type_name("LINK");
-  command
-      ->add_option("--tip", options->links.tip,
-                   "Link of the URDF that is Ftool [default: the only end of six joints]")
-      ->type_name("LINK");
-  command
-      ->add_option("--flange", options->links.flange,
-                   "Link of the URDF at which F6 lies [default: tool0, else the tip]")
-      ->type_name("LINK");
-  command->add_option("-o,--output", options->out, "File to write")->type_name("FILE")->required();
-  options->common.add_to(*command);
-  command->footer(
+  add_value(command, "--robot", options.robot, "ROBOT.yaml", "Robot file (c, urdf)");
+  add_value(command, "--calibration", options.calibration, "CAL.yaml", "Calibration file (urdf)");
+  add_value(command, "--urdf", options.urdf, "ARM.urdf",
+            "URDF of the same arm, whose joints are corrected (urdf)");
+  add_value(command, "--base", options.links.base, "LINK",
+            "Link of the URDF that is the base [default: the root link]");
+  add_value(command, "--tip", options.links.tip, "LINK",
+            "Link of the URDF that is Ftool [default: the only end of six joints]");
+  add_value(command, "--flange", options.links.flange, "LINK",
+            "Link of the URDF at which F6 lies [default: tool0, else the tip]");
+  add_value(command, "-o,--output", options.out, "FILE", "File to write")->required();
+  options.common.add_to(command);
+  command.footer(
       "Examples:\n"
       "  flexcomp export --robot tx60l.yaml --as c -o tx60l.h\n"
       "  flexcomp export --robot tx60l.yaml --calibration cal.yaml --urdf tx60l.urdf --as urdf -o "
@@ -193,7 +183,6 @@ void add_export(CLI::App& app) {
       "  arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, NULL, &flash);\n"
       "The constant has the robot's name; the comment in the header shows the nominal hash, of which\n"
       "\"flexcomp push\" says when a controller has another one. Export again when the robot file changes.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

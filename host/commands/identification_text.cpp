@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "commands/identification_text.hpp"
+#include "commands/result_text.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "commands/accuracy.hpp"
 #include "commands/colour.hpp"
 #include "identification/fitted_parameters.hpp"
 #include "units.hpp"

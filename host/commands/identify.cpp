@@ -2,14 +2,11 @@
 #include <fmt/format.h>
 
 #include <map>
-#include <memory>
 #include <string>
 
-#include "commands/accuracy.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/identification_text.hpp"
-#include "commands/outputs.hpp"
+#include "commands/result_text.hpp"
 #include "errors.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
@@ -95,58 +92,47 @@ void Identify::run() const {
 }  // namespace
 
 void add_identify(CLI::App& app) {
-  auto options = std::make_shared<Identify>();
-  CLI::App* command = app.add_subcommand("identify",
-                                         "Parameters with uncertainty from measured poses, positions or "
-                                         "reflector points");
-  add_robot_option(*command, options->robot);
-  command
-      ->add_option("--data", options->data,
-                   "Measured data: joint readings [deg] and poses, positions or reflectors [mm]")
-      ->type_name("D.csv")
+  auto [command, options] =
+      add_command<Identify>(app, "identify",
+                            "Parameters with uncertainty from measured poses, positions or "
+                            "reflector points");
+  add_robot_option(command, options.robot);
+  add_value(command, "--data", options.data, "D.csv",
+            "Measured data: joint readings [deg] and poses, positions or reflectors [mm]")
       ->required();
   command
-      ->add_option(
-          "--model", options->model,
-          "full: geometry, joint compliance and link gravity (39 parameters); geometric; no-gravity; "
-          "no-stiffness")
+      .add_option("--model", options.model,
+                  "full: geometry, joint compliance and link gravity (39 parameters); geometric; no-gravity; "
+                  "no-stiffness")
       ->check(CLI::IsMember(model_kinds))
       ->capture_default_str();
   command
-      ->add_option("--frames", options->frames,
-                   "nominal: the instrument measures in Fb and the tool point is known; fit: both are "
-                   "fitted. Default: "
-                   "fit where the nominal frames are off by more than 20 mm or 2 degrees")
+      .add_option("--frames", options.frames,
+                  "nominal: the instrument measures in Fb and the tool point is known; fit: both are "
+                  "fitted. Default: "
+                  "fit where the nominal frames are off by more than 20 mm or 2 degrees")
       ->check(CLI::IsMember(frame_choices));
-  command->add_option("-o,--output", options->out, "Calibration file")->type_name("CAL.yaml")->required();
-  command
-      ->add_option(
-          "--fix", options->fix,
-          "Do not fit this parameter, it is known: NAME (zero) or NAME=VALUE in the unit that the name "
-          "ends with; may be given again")
-      ->type_name("NAME[=VALUE]")
+  add_value(command, "-o,--output", options.out, "CAL.yaml", "Calibration file")->required();
+  add_value(command, "--fix", options.fix, "NAME[=VALUE]",
+            "Do not fit this parameter, it is known: NAME (zero) or NAME=VALUE in the unit that the name "
+            "ends with; may be given again")
       ->allow_extra_args(false);
-  command
-      ->add_option(
-          "--tolerances", options->tolerances,
-          "How far from the drawing parameters may be, used as prior knowledge. A file with "
-          "`tolerances:` and per line NAME: SIGMA, or NAME: {expected: VALUE, sigma: SIGMA}, in the unit "
-          "that the name ends with; * stands for any text (link*.d_mm: 0.2)")
-      ->type_name("T.yaml");
-  command->add_flag(
-      "--unbounded", options->unbounded,
+  add_value(command, "--tolerances", options.tolerances, "T.yaml",
+            "How far from the drawing parameters may be, used as prior knowledge. A file with "
+            "`tolerances:` and per line NAME: SIGMA, or NAME: {expected: VALUE, sigma: SIGMA}, in the unit "
+            "that the name ends with; * stands for any text (link*.d_mm: 0.2)");
+  command.add_flag(
+      "--unbounded", options.unbounded,
       "Compliances may come out negative (default: as small as zero, with a one-sided interval)");
-  command->add_flag("--plain", options->plain,
-                    "Ordinary least squares: every row has weight 1, outliers too");
-  command->add_option("--report", options->report, "Self-contained page of the result")->type_name("F.html");
-  add_force_option(*command, options->force);
-  options->common.add_seed_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+  command.add_flag("--plain", options.plain, "Ordinary least squares: every row has weight 1, outliers too");
+  add_value(command, "--report", options.report, "F.html", "Self-contained page of the result");
+  add_force_option(command, options.force);
+  options.common.add_seed_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp identify --robot tx60l.yaml --data measured.csv -o cal.yaml\n"
       "Exit status 5: the calibration was written, but the data know less than random poses would (the "
       "message names what is missing and poses that would identify it), or the fit did not converge.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

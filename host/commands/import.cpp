@@ -3,14 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
 #include "commands/import_measurements.hpp"
-#include "commands/outputs.hpp"
 #include "exchange/imported_arm.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
@@ -123,9 +121,8 @@ void Import::run() const {
 }  // namespace
 
 void add_import(CLI::App& app) {
-  auto options = std::make_shared<Import>();
-  CLI::App* command = app.add_subcommand(
-      "import",
+  auto [command, options] = add_command<Import>(
+      app, "import",
       "What others write: an instrument's points with a robot's log into data, or a URDF into a robot file.\n"
       "With --joints: SOURCE is a point list as SpatialAnalyzer, PolyWorks and their like export it; each "
       "point gets the "
@@ -142,28 +139,21 @@ void add_import(CLI::App& app) {
       "constant transform "
       "between\n"
       "them is in the file's comment and in --json.");
-  command
-      ->add_option("source", options->source,
-                   "Point list of an instrument; or a URDF (after xacro), or a robot file (.yaml)")
-      ->type_name("FILE")
+  add_value(command, "source", options.source, "FILE",
+            "Point list of an instrument; or a URDF (after xacro), or a robot file (.yaml)")
       ->required();
-  command->add_option("--base", options->links.base, "Link that is to be the base [default: the root link]")
-      ->type_name("LINK");
-  command
-      ->add_option("--tip", options->links.tip,
-                   "Link that is to be Ftool [default: the only end of six joints]")
-      ->type_name("LINK");
-  command
-      ->add_option("--flange", options->links.flange,
-                   "Link at which F6 is to lie, between joint 6 and the tip [default: tool0, else the tip]")
-      ->type_name("LINK");
-  command->add_option("--name", options->name, "Name of the robot [default: the file's]")->type_name("NAME");
-  command->add_option("-o,--output", options->out, "Robot file, or data file with --joints")
-      ->type_name("FILE")
+  add_value(command, "--base", options.links.base, "LINK",
+            "Link that is to be the base [default: the root link]");
+  add_value(command, "--tip", options.links.tip, "LINK",
+            "Link that is to be Ftool [default: the only end of six joints]");
+  add_value(command, "--flange", options.links.flange, "LINK",
+            "Link at which F6 is to lie, between joint 6 and the tip [default: tool0, else the tip]");
+  add_value(command, "--name", options.name, "NAME", "Name of the robot [default: the file's]");
+  add_value(command, "-o,--output", options.out, "FILE", "Robot file, or data file with --joints")
       ->required();
-  options->measurements.add_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+  options.measurements.add_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Examples:\n"
       "  flexcomp import tracker.txt --joints log.csv --robot tx60l.yaml -o measured.csv\n"
       "  flexcomp import tracker.txt --joints log.csv --map map.yaml --names '*::{pose}' --unit mm --robot "
@@ -172,7 +162,6 @@ void add_import(CLI::App& app) {
       "  flexcomp import kr6.urdf --base base_link --tip tool0 --name kuka-kr6-r900 -o kr6.yaml\n"
       "docs/formats.md shows the formats and a map. Payload, reflectors, noise and capsules are not in a "
       "URDF: add yours.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

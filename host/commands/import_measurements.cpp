@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <map>
 
-#include "commands/numbers.hpp"
 #include "exchange/declared_unit.hpp"
 #include "exchange/joined_data.hpp"
 #include "exchange/point_list.hpp"

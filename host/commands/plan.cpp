@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/numbers.hpp"
-#include "commands/outputs.hpp"
-#include "commands/plan_text.hpp"
 #include "commands/progress_bar.hpp"
+#include "commands/result_text.hpp"
 #include "commands/stop_on_signal.hpp"
 #include "files/cell_file.hpp"
 #include "files/data_file.hpp"
@@ -121,80 +118,66 @@ void Plan::run() const {
 }  // namespace
 
 void add_plan(CLI::App& app) {
-  auto options = std::make_shared<Plan>();
-  CLI::App* command = app.add_subcommand(
-      "plan",
+  auto [command, options] = add_command<Plan>(
+      app, "plan",
       "Measurement poses from which the parameters can be known best, inside limits, collisions and beam");
-  add_robot_option(*command, options->robot);
-  command->add_option("--cell", options->cell, "Tracker, obstacles and clearances of the place")
-      ->type_name("CELL.yaml");
-  command->add_option("--poses", options->poses, "How many poses to plan (with --extend: how many more)")
+  add_robot_option(command, options.robot);
+  add_value(command, "--cell", options.cell, "CELL.yaml", "Tracker, obstacles and clearances of the place");
+  command.add_option("--poses", options.poses, "How many poses to plan (with --extend: how many more)")
       ->check(CLI::Range(1U, 1000U))
       ->required();
+  add_value(command, "--candidates", options.candidates, "P.csv",
+            "Choose among these joint readings only [deg]; with a column payload_kg each has its own load");
   command
-      ->add_option(
-          "--candidates", options->candidates,
-          "Choose among these joint readings only [deg]; with a column payload_kg each has its own load")
-      ->type_name("P.csv");
-  command
-      ->add_option("--method", options->method,
-                   "refine: exchange, then all joints along the gradient (default); exchange (default with "
-                   "--candidates); detmax; sapso")
+      .add_option("--method", options.method,
+                  "refine: exchange, then all joints along the gradient (default); exchange (default with "
+                  "--candidates); detmax; sapso")
       ->check(CLI::IsMember(planning_methods));
-  command
-      ->add_option("--extend", options->extend,
-                   "Poses that are measured already (data file or joint readings): plan the next ones")
-      ->type_name("D.csv");
-  command
-      ->add_option("--payloads", options->payloads,
-                   "Payloads to choose from at each pose [kg], at the robot file's centre of mass")
+  add_value(command, "--extend", options.extend, "D.csv",
+            "Poses that are measured already (data file or joint readings): plan the next ones");
+  add_value(command, "--payloads", options.payloads, "KG,KG,…",
+            "Payloads to choose from at each pose [kg], at the robot file's centre of mass")
       ->delimiter(',')
-      ->check(non_negative_number())
-      ->type_name("KG,KG,…");
+      ->check(non_negative_number());
   command
-      ->add_option("--measure", options->measure,
-                   "What will be measured: pose, position or reflectors. Default: as in --extend, else pose")
+      .add_option("--measure", options.measure,
+                  "What will be measured: pose, position or reflectors. Default: as in --extend, else pose")
       ->check(CLI::IsMember(measurement_kinds));
-  command->add_option("--model", options->model, "What shall be identified, as for identify")
+  command.add_option("--model", options.model, "What shall be identified, as for identify")
       ->check(CLI::IsMember(model_kinds))
       ->capture_default_str();
   command
-      ->add_option("--frames", options->frames,
-                   "nominal: the instrument measures in Fb; fit: frames will be fitted and cost information")
+      .add_option("--frames", options.frames,
+                  "nominal: the instrument measures in Fb; fit: frames will be fitted and cost information")
       ->check(CLI::IsMember({"nominal", "fit"}))
       ->capture_default_str();
   command
-      ->add_option("--effort", options->effort,
-                   "How long to search: 1 is about a second of work for refine; 10 is ten times that")
+      .add_option("--effort", options.effort,
+                  "How long to search: 1 is about a second of work for refine; 10 is ten times that")
       ->check(number_between(0.001, 1e4))
       ->capture_default_str();
-  command
-      ->add_option("--state", options->state,
-                   "Write the state of the search to FILE, now and then and at the end")
-      ->type_name("FILE");
-  command
-      ->add_option("--resume", options->resume,
-                   "Go on from a state of this very task, to the result that an unbroken search would have")
-      ->type_name("FILE");
-  command->add_flag(
-      "--compare", options->compare,
+  add_value(command, "--state", options.state, "FILE",
+            "Write the state of the search to FILE, now and then and at the end");
+  add_value(command, "--resume", options.resume, "FILE",
+            "Go on from a state of this very task, to the result that an unbroken search would have");
+  command.add_flag(
+      "--compare", options.compare,
       "Also run every method on this task, exchange with 200 restarts, and print them side by side "
       "(minutes)");
-  command->add_option("-o,--output", options->out, "The plan: joint readings [deg] in the order of travel")
-      ->type_name("PLAN.csv")
+  add_value(command, "-o,--output", options.out, "PLAN.csv",
+            "The plan: joint readings [deg] in the order of travel")
       ->required();
-  command->add_option("--report", options->report, "Self-contained page of the plan")->type_name("F.html");
-  add_force_option(*command, options->force);
-  options->common.add_seed_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+  add_value(command, "--report", options.report, "F.html", "Self-contained page of the plan");
+  add_force_option(command, options.force);
+  options.common.add_seed_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp plan --robot tx60l.yaml --cell cell.yaml --poses 14 --payloads 0,1.108 -o "
       "plan.csv\n"
       "The criterion is expected Omin / O1 (smaller is better). Ctrl-C stops the search; the best plan so "
       "far is "
       "written.\n"
       "Then measure, add the measured columns to the file and run identify.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <memory>
 #include <string>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
@@ -59,31 +57,22 @@ void Predict::run() const {
 }  // namespace
 
 void add_predict(CLI::App& app) {
-  auto options = std::make_shared<Predict>();
-  CLI::App* command =
-      app.add_subcommand("predict", "The pose that the forward model gives for joint readings");
-  add_robot_option(*command, options->robot);
-  command
-      ->add_option("--calibration", options->calibration,
-                   "Calibration or truth file; without it the nominal arm")
-      ->type_name("CAL.yaml|TRUTH.yaml");
-  command
-      ->add_option(
-          "--joints", options->joints,
-          "Joint readings q1_deg … q6_deg [deg] and, where it matters, context (payload_kg, temp_c, …); "
-          "a data file will do, what was measured in it is not used")
-      ->type_name("Q.csv")
+  auto [command, options] =
+      add_command<Predict>(app, "predict", "The pose that the forward model gives for joint readings");
+  add_robot_option(command, options.robot);
+  add_value(command, "--calibration", options.calibration, "CAL.yaml|TRUTH.yaml",
+            "Calibration or truth file; without it the nominal arm");
+  add_value(command, "--joints", options.joints, "Q.csv",
+            "Joint readings q1_deg … q6_deg [deg] and, where it matters, context (payload_kg, temp_c, …); "
+            "a data file will do, what was measured in it is not used")
       ->required();
-  command
-      ->add_option("-o,--output", options->out,
-                   "Poses in the columns of a data file [mm, quaternion w x y z]")
-      ->type_name("P.csv")
+  add_value(command, "-o,--output", options.out, "P.csv",
+            "Poses in the columns of a data file [mm, quaternion w x y z]")
       ->required();
-  add_force_option(*command, options->force);
-  options->common.add_to(*command);
-  command->footer(
+  add_force_option(command, options.force);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp predict --robot tx60l.yaml --calibration cal.yaml --joints q.csv -o p.csv");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

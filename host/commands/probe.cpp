@@ -10,7 +10,6 @@
 #include "commands/answers.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
-#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/data_file.hpp"
 #include "files/write_file.hpp"
@@ -100,20 +99,16 @@ void Probe::run() const {
 }  // namespace
 
 void add_probe(CLI::App& app) {
-  auto state = std::make_shared<Probe>();
-  CLI::App* command = app.add_subcommand("probe", "What the running controller itself answers to targets");
-  state->bus.add_bus_to(*command, "--at");
-  command->add_option("--targets", state->targets, "Targets, as for compensate")
-      ->type_name("T.csv")
+  auto [command, state] =
+      add_command<Probe>(app, "probe", "What the running controller itself answers to targets");
+  state.bus.add_bus_to(command, "--at");
+  add_value(command, "--targets", state.targets, "T.csv", "Targets, as for compensate")->required();
+  add_value(command, "-o,--output", state.out, "OUT.csv", "The same columns as compensate writes")
       ->required();
-  command->add_option("-o,--output", state->out, "The same columns as compensate writes")
-      ->type_name("OUT.csv")
-      ->required();
-  add_optional_robot_option(*command, state->robot);
-  command->add_flag("--force", state->force,
-                    "Go on where input is only suspicious (joints that look like radians)");
-  command->footer("Example:\n  flexcomp probe --at can:vcan0:5 --targets t.csv -o answers.csv");
-  command->callback([state] { state->run(); });
+  add_optional_robot_option(command, state.robot);
+  command.add_flag("--force", state.force,
+                   "Go on where input is only suspicious (joints that look like radians)");
+  command.footer("Example:\n  flexcomp probe --at can:vcan0:5 --targets t.csv -o answers.csv");
 }
 
 }  // namespace flexcomp::host

@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "commands/numbers.hpp"
+#include "commands/common_options.hpp"
 #include "commands/progress_bar.hpp"
 #include "exchange/target_program.hpp"
 #include "flexcomp/model.hpp"

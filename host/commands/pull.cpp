@@ -7,7 +7,6 @@
 #include "bus/transfer.hpp"
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
-#include "commands/outputs.hpp"
 #include "commands/progress_bar.hpp"
 #include "files/calibration_file.hpp"
 #include "files/write_file.hpp"
@@ -53,15 +52,12 @@ struct Pull {
 }  // namespace
 
 void add_pull(CLI::App& app) {
-  auto state = std::make_shared<Pull>();
-  CLI::App* command = app.add_subcommand("pull", "Read the active set of a controller");
-  state->bus.add_bus_to(*command, "--from");
-  command->add_option("-o,--output", state->out, "Calibration file to write")->type_name("CAL.yaml");
-  command->add_option("--image", state->image, "Write the parameter image, byte for byte, to FILE")
-      ->type_name("FILE");
-  add_optional_robot_option(*command, state->robot);
-  command->footer("Example:\n  flexcomp pull --from modbus-tcp:10.0.0.7 -o active.yaml");
-  command->callback([state] { state->run(); });
+  auto [command, state] = add_command<Pull>(app, "pull", "Read the active set of a controller");
+  state.bus.add_bus_to(command, "--from");
+  add_value(command, "-o,--output", state.out, "CAL.yaml", "Calibration file to write");
+  add_value(command, "--image", state.image, "FILE", "Write the parameter image, byte for byte, to FILE");
+  add_optional_robot_option(command, state.robot);
+  command.footer("Example:\n  flexcomp pull --from modbus-tcp:10.0.0.7 -o active.yaml");
 }
 
 }  // namespace flexcomp::host

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/numbers.hpp"
-#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
@@ -108,43 +105,33 @@ void Report::run() const {
 }  // namespace
 
 void add_report(CLI::App& app) {
-  auto options = std::make_shared<Report>();
-  CLI::App* command =
-      app.add_subcommand("report", "One self-contained page of what is known about a calibration");
-  add_robot_option(*command, options->robot);
-  command->add_option("--calibration", options->calibration, "Its parameters with uncertainty")
-      ->type_name("CAL.yaml");
-  command
-      ->add_option("--errors", options->errors,
-                   "Where an arm went: two files with q1_deg … q6_deg, dx_mm dy_mm dz_mm and, where known, "
-                   "distance_deg, payload_kg, temp_c, time_s; "
-                   "may be given several times")
-      ->type_name(errors_form)
+  auto [command, options] =
+      add_command<Report>(app, "report", "One self-contained page of what is known about a calibration");
+  add_robot_option(command, options.robot);
+  add_value(command, "--calibration", options.calibration, "CAL.yaml", "Its parameters with uncertainty");
+  add_value(command, "--errors", options.errors, errors_form,
+            "Where an arm went: two files with q1_deg … q6_deg, dx_mm dy_mm dz_mm and, where known, "
+            "distance_deg, payload_kg, temp_c, time_s; "
+            "may be given several times")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command
-      ->add_option("--result", options->results,
-                   "A result of identify --json or validate --json, as a line of a table")
-      ->type_name(result_form)
+  add_value(command, "--result", options.results, result_form,
+            "A result of identify --json or validate --json, as a line of a table")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--link", options->links, "A page beside this one")
-      ->type_name(link_form)
+  add_value(command, "--link", options.links, link_form, "A page beside this one")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--fact", options->facts, "A line of the box at the top")
-      ->type_name("NAME=VALUE")
+  add_value(command, "--fact", options.facts, "NAME=VALUE", "A line of the box at the top")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--title", options->title, "Heading");
-  command->add_option("--summary", options->summary, "A sentence below it");
-  command->add_option("--noise-floor-mm", options->noise_floor_mm, "Drawn into the plots of errors")
+  command.add_option("--title", options.title, "Heading");
+  command.add_option("--summary", options.summary, "A sentence below it");
+  command.add_option("--noise-floor-mm", options.noise_floor_mm, "Drawn into the plots of errors")
       ->check(non_negative_number());
-  command->add_option("-o,--output", options->out, "Page to write")->type_name("F.html")->required();
-  options->common.add_to(*command);
-  command->footer(
-      "Example:\n  flexcomp report --robot tx60l.yaml --calibration cal.yaml -o calibration.html");
-  command->callback([options] { options->run(); });
+  add_value(command, "-o,--output", options.out, "F.html", "Page to write")->required();
+  options.common.add_to(command);
+  command.footer("Example:\n  flexcomp report --robot tx60l.yaml --calibration cal.yaml -o calibration.html");
 }
 
 }  // namespace flexcomp::host

@@ -2,15 +2,12 @@
 #include <fmt/format.h>
 
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/numbers.hpp"
-#include "commands/outputs.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
@@ -79,57 +76,50 @@ void Simulate::run() const {
 }  // namespace
 
 void add_simulate(CLI::App& app) {
-  auto options = std::make_shared<Simulate>();
-  CLI::App* command = app.add_subcommand("simulate", "Measured data from an assumed true robot");
-  add_robot_option(*command, options->robot);
-  command->add_option("--truth", options->truth, "Truth file: the robot's errors by name")
-      ->type_name("TRUTH.yaml")
+  auto [command, options] =
+      add_command<Simulate>(app, "simulate", "Measured data from an assumed true robot");
+  add_robot_option(command, options.robot);
+  add_value(command, "--truth", options.truth, "TRUTH.yaml", "Truth file: the robot's errors by name")
       ->required();
-  CLI::Option_group* where = command->add_option_group("poses", "Where to measure");
-  where->add_option("--poses", options->poses, "Number of random poses, uniform within the joint limits")
+  CLI::Option_group* where = command.add_option_group("poses", "Where to measure");
+  where->add_option("--poses", options.poses, "Number of random poses, uniform within the joint limits")
       ->check(CLI::Range(1U, 10000000U));
   CLI::Option* joints =
       where
-          ->add_option("--joints", options->joints,
+          ->add_option("--joints", options.joints,
                        "Poses from a file instead, with its payloads and context: a plan, say")
           ->type_name("Q.csv");
   where->require_option(1);
-  command->add_option("--measure", options->measure, "What is measured: pose, position or reflectors")
+  command.add_option("--measure", options.measure, "What is measured: pose, position or reflectors")
       ->check(CLI::IsMember({"pose", "position", "reflectors"}))
       ->capture_default_str();
-  command
-      ->add_option("--payloads", options->payloads,
-                   "Payloads in turn [kg], at the robot file's centre of mass")
+  add_value(command, "--payloads", options.payloads, "KG,KG,…",
+            "Payloads in turn [kg], at the robot file's centre of mass")
       ->delimiter(',')
       ->check(non_negative_number())
-      ->type_name("KG,KG,…")
       ->excludes(joints);
   command
-      ->add_flag("--context", options->context,
-                 "Also random motion before each pose [deg], temperature [deg C] and time [s]")
+      .add_flag("--context", options.context,
+                "Also random motion before each pose [deg], temperature [deg C] and time [s]")
       ->excludes(joints);
   command
-      ->add_option(
-          "--noise", options->noise,
-          "N1 (0.035 mm, 0.007 deg per axis), N2 (twice that) or none; reflectors: mm per coordinate")
+      .add_option("--noise", options.noise,
+                  "N1 (0.035 mm, 0.007 deg per axis), N2 (twice that) or none; reflectors: mm per coordinate")
       ->check(CLI::IsMember({"N1", "N2", "none"}))
       ->capture_default_str();
-  command
-      ->add_option("--frame", options->frame,
-                   "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg], turned by "
-                   "Rot(z,rz) Rot(y,ry) Rot(x,rx)")
+  add_value(command, "--frame", options.frame, "X,Y,Z,RX,RY,RZ",
+            "Where the instrument sees the robot's base: x,y,z,rx,ry,rz [mm, deg], turned by "
+            "Rot(z,rz) Rot(y,ry) Rot(x,rx)")
       ->delimiter(',')
       ->expected(6)
-      ->check(finite_number())
-      ->type_name("X,Y,Z,RX,RY,RZ");
-  command->add_option("-o,--output", options->out, "Data file")->type_name("D.csv")->required();
-  options->common.add_seed_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+      ->check(finite_number());
+  add_value(command, "-o,--output", options.out, "D.csv", "Data file")->required();
+  options.common.add_seed_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp simulate --robot tx60l.yaml --truth truth.yaml --poses 60 --payloads 0,1.108 "
       "--noise N1 -o "
       "data.csv");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

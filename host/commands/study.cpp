@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "studies/study.hpp"
-#include "commands/outputs.hpp"
+#include "commands/common_options.hpp"
 #include "json.hpp"
 
 #include <fmt/format.h>
@@ -8,12 +8,10 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "commands/commands.hpp"
-#include "commands/common_options.hpp"
 #include "report/page.hpp"
 
 namespace flexcomp::host {
@@ -160,33 +158,31 @@ void StudyCommand::run() const {
 }  // namespace
 
 void add_study(CLI::App& app) {
-  auto options = std::make_shared<StudyCommand>();
-  CLI::App* command = app.add_subcommand(
-      "study", "The studies of Chen, Zhang and Sun 2019: the paper's figure, ours and the Cramér-Rao limit");
+  auto [command, options] = add_command<StudyCommand>(
+      app, "study",
+      "The studies of Chen, Zhang and Sun 2019: the paper's figure, ours and the Cramér-Rao limit");
   std::vector<std::string> names;
   std::string list = "Which one:";
   for (const StudyEntry& entry : studies()) {
     names.emplace_back(entry.name);
     list += fmt::format("\n  {:<8} {}", entry.name, entry.about);
   }
-  command->add_option("name", options->name, list)->check(CLI::IsMember(names))->required();
-  command->add_option("--arm", options->arm, "Which arm of the paper: tx60l, rx160l or both")
+  command.add_option("name", options.name, list)->check(CLI::IsMember(names))->required();
+  command.add_option("--arm", options.arm, "Which arm of the paper: tx60l, rx160l or both")
       ->check(CLI::IsMember({"tx60l", "rx160l", "both"}))
       ->capture_default_str();
-  command->add_option("--noise", options->noise, "N1 (0.035 mm, 0.007 deg), N2 (twice that) or both")
+  command.add_option("--noise", options.noise, "N1 (0.035 mm, 0.007 deg), N2 (twice that) or both")
       ->check(CLI::IsMember({"N1", "N2", "both"}))
       ->capture_default_str();
-  command->add_option("--repeats", options->repeats, "Calibrations with fresh noise behind each figure")
+  command.add_option("--repeats", options.repeats, "Calibrations with fresh noise behind each figure")
       ->check(CLI::Range(20, 1000000))
       ->capture_default_str();
-  command->add_option("--report", options->report, "Self-contained page with the table and plots")
-      ->type_name("F.html");
-  options->common.add_seed_to(*command);
-  options->common.add_to(*command);
-  command->footer(
+  add_value(command, "--report", options.report, "F.html", "Self-contained page with the table and plots");
+  options.common.add_seed_to(command);
+  options.common.add_to(command);
+  command.footer(
       "Example:\n  flexcomp study fig2 --json fig2.json --report fig2.html\nStudies with calibrations (fig4, "
       "fig8, …) take up to some minutes; --repeats 50 makes them shorter.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <memory>
 #include <string>
 
-#include "commands/accuracy.hpp"
 #include "commands/commands.hpp"
 #include "commands/common_options.hpp"
-#include "commands/outputs.hpp"
+#include "commands/result_text.hpp"
 #include "errors.hpp"
 #include "files/calibration_file.hpp"
 #include "files/data_file.hpp"
@@ -70,32 +68,27 @@ void Validate::run() const {
 }  // namespace
 
 void add_validate(CLI::App& app) {
-  auto options = std::make_shared<Validate>();
-  CLI::App* command = app.add_subcommand(
-      "validate", "Error before and after on measured poses that were not used for identification");
-  add_robot_option(*command, options->robot);
-  command->add_option("--calibration", options->calibration, "Calibration file")
-      ->type_name("CAL.yaml")
+  auto [command, options] = add_command<Validate>(
+      app, "validate", "Error before and after on measured poses that were not used for identification");
+  add_robot_option(command, options.robot);
+  add_value(command, "--calibration", options.calibration, "CAL.yaml", "Calibration file")->required();
+  add_value(command, "--data", options.data, "V.csv", "Measured data that were not fitted [deg, mm]")
       ->required();
-  command->add_option("--data", options->data, "Measured data that were not fitted [deg, mm]")
-      ->type_name("V.csv")
-      ->required();
-  CLI::Option* report = command->add_option("--report", options->report, "Self-contained page of the result")
-                            ->type_name("F.html");
+  CLI::Option* report =
+      add_value(command, "--report", options.report, "F.html", "Self-contained page of the result");
   command
-      ->add_flag(
-          "--corrected", options->corrected,
+      .add_flag(
+          "--corrected", options.corrected,
           "The arm was driven with corrected commands; the joints of the data are those that the program "
           "wanted: how far is it from the drawing, in the frames of the calibration?")
       ->excludes(report);
-  add_force_option(*command, options->force);
-  options->common.add_to(*command);
-  command->footer(
+  add_force_option(command, options.force);
+  options.common.add_to(command);
+  command.footer(
       "Examples:\n  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data others.csv\n"
       "  flexcomp validate --robot tx60l.yaml --calibration cal.yaml --data driven.csv --corrected\n"
       "Exit status 5: the error after is not below the error before, or chi-square per degree of freedom "
       "lies outside its 99.9 % interval.");
-  command->callback([options] { options->run(); });
 }
 
 }  // namespace flexcomp::host

@@ -22,22 +22,6 @@ using flexcomp::Term;
 using flexcomp::Vector6;
 using Jet = ceres::Jet<double, 1>;
 
-flexcomp::Context<Jet> as_jets(const flexcomp::Context<double>& from) {
-  flexcomp::Context<Jet> c;
-  c.payload_kg = Jet(from.payload_kg);
-  c.temperature_c = Jet(from.temperature_c);
-  c.time_s = Jet(from.time_s);
-  for (std::size_t k = 0; k < 3; ++k) {
-    c.payload_com_m[k] = Jet(from.payload_com_m[k]);
-    c.force_n[k] = Jet(from.force_n[k]);
-  }
-  for (std::size_t k = 0; k < 6; ++k) {
-    c.direction[k] = Jet(from.direction[k]);
-    c.relative_speed[k] = Jet(from.relative_speed[k]);
-  }
-  return c;
-}
-
 /// Position and orientation part of the derivative: dp, and w of dR = [w] R.
 Vector6<double> derivative(const flexcomp::Pose<Jet>& pose) {
   Eigen::Matrix3d r;
@@ -58,18 +42,16 @@ Vector6<double> derivative(const flexcomp::Pose<Jet>& pose) {
 /// The Jet model of a set whose last term has its coefficient as the variable.
 class DualArm {
  public:
-  flexcomp::Refusal prepare(const arms::Robot& robot, const arms::TermSet<double>& set) {
+  DualArm(const arms::Robot& robot, const arms::TermSet<double>& set) {
     arms::TermSet<Jet> jets = arms::as<Jet>(set);
     jets.terms.back().coefficient.v[0] = 1;
-    return model_.prepare(robot, jets.list());
+    model_ = arms::prepared(robot, jets);
   }
 
   /// Derivative for that coefficient; of the measured point where the term is the point's.
   Vector6<double> at(const Joints& q, const flexcomp::Context<double>& context, bool point) const {
-    std::array<Jet, 6> joints;
-    for (std::size_t i = 0; i < 6; ++i) joints[i] = Jet(q[i]);
     flexcomp::Workspace<Jet> ws;
-    const flexcomp::Pose<Jet> pose = flexcomp::forward(model_, joints, as_jets(context), ws);
+    const flexcomp::Pose<Jet> pose = flexcomp::forward(model_, arms::as<Jet>(q), arms::as<Jet>(context), ws);
     if (!point) return derivative(pose);
     Vector6<double> out = Vector6<double>::Zero();
     for (int i = 0; i < 3; ++i)
@@ -79,17 +61,6 @@ class DualArm {
 
  private:
   Model<Jet> model_;
-};
-
-struct Worst {
-  double relative = 0;
-  Term<double> term{};
-  void take(double r, const Term<double>& t) {
-    if (r > relative) {
-      relative = r;
-      term = t;
-    }
-  }
 };
 
 std::string describe(const Term<double>& t) {
@@ -102,37 +73,48 @@ std::string describe(const Term<double>& t) {
 /// rounding of a torque or lever that is zero there.
 double floor_of(const Term<double>& t) { return 1e-6 * arms::usual_value(t); }
 
+using ColumnOf = Vector6<double> (*)(const Model<double>&, const flexcomp::Linearisation<double>&,
+                                     const Term<double>&, const flexcomp::Context<double, 6>&);
+
+/// Asserts that `column` of the set's last term is the derivative, within 1e-9, at random poses.
+/// \return the largest norm of the derivative
+double compare_last(const arms::Arm& arm, const arms::TermSet<double>& set, ColumnOf column, int poses,
+                    arms::Random& random, double& worst) {
+  const Term<double>& term = set.terms.back();
+  const auto model = arms::prepared(arm.robot, set);
+  const DualArm dual(arm.robot, set);
+  double largest = 0;
+  for (int n = 0; n < poses; ++n) {
+    const Joints q = random.pose(arm.robot);
+    const auto context = arms::random_context(arm.robot, random);
+    const auto at = arms::linearised(model, q, context);
+    const Vector6<double> expected = dual.at(q, context, term.place.body == flexcomp::body::point);
+    const Vector6<double> got = column(model, at, term, context);
+    const double relative = (got - expected).norm() / std::max(expected.norm(), floor_of(term));
+    worst = std::max(worst, relative);
+    EXPECT_LE(relative, 1e-9) << arm.name << ", " << describe(term) << "\n"
+                              << got.transpose() << "\n"
+                              << expected.transpose();
+    largest = std::max(largest, expected.norm());
+  }
+  return largest;
+}
+
 TEST(ExactColumn, EveryPlaceAndBasisAgreesWithDualNumbers) {
   std::size_t compared = 0;
   std::size_t idle = 0;
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(10);
-    Worst constant;
-    Worst varying;
+    double constant = 0;
+    double varying = 0;
     for (const Place place : arms::all_places()) {
       for (const Term<double>& term : arms::all_bases(place, random)) {
         arms::TermSet<double> set = arms::everything(arm, random);
         set.terms.push_back(term);
-        Model<double> model;
-        ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none) << describe(term);
-        DualArm dual;
-        ASSERT_EQ(dual.prepare(arm.robot, set), flexcomp::Refusal::none);
-        double largest = 0;
-        for (int n = 0; n < 6; ++n) {
-          const Joints q = random.pose(arm.robot);
-          const auto context = arms::random_context(arm.robot, random);
-          flexcomp::Linearisation<double> at;
-          flexcomp::linearise(model, q, context, at);
-          const Vector6<double> expected = dual.at(q, context, place.body == flexcomp::body::point);
-          const Vector6<double> got = flexcomp::exact_column(model, at, term, context);
-          const double relative = (got - expected).norm() / std::max(expected.norm(), floor_of(term));
-          (flexcomp::is_constant(term) ? constant : varying).take(relative, term);
-          ASSERT_LE(relative, 1e-9) << arm.name << ", " << describe(term) << "\n"
-                                    << got.transpose() << "\n"
-                                    << expected.transpose();
-          largest = std::max(largest, expected.norm());
-          ++compared;
-        }
+        constexpr int poses = 6;
+        const double largest = compare_last(arm, set, flexcomp::exact_column, poses, random,
+                                            flexcomp::is_constant(term) ? constant : varying);
+        compared += poses;
         // Levers of links without a length, or of vertical axes, are zero by definition; so is the growth of a
         // length that is nominally zero.
         const bool may_be_zero = term.basis == Basis::link_weight || term.basis == Basis::thermal;
@@ -140,7 +122,7 @@ TEST(ExactColumn, EveryPlaceAndBasisAgreesWithDualNumbers) {
       }
     }
     std::printf("[ measured ] %s: exact_column() against Jets, relative: constant %.1e, varying %.1e\n",
-                arm.name, constant.relative, varying.relative);
+                arm.name, constant, varying);
   }
   // A basis that is zero wherever the test looks would be no test.
   std::printf("[ measured ] %zu columns, %zu terms idle in all their poses\n", compared, idle);
@@ -152,22 +134,13 @@ TEST(ExactColumn, HoldsForLargeErrorsToo) {
   // put a_3 = -1 mm of Table 1 exactly on the 1 mm below which a link-weight lever is zero.)
   const arms::Arm& arm = arms::all()[0];
   arms::Random random(11);
+  double worst = 0;
   for (const Place place : arms::all_places()) {
-    for (Term<double> term : arms::all_bases(place, random)) {
+    for (const Term<double>& term : arms::all_bases(place, random)) {
       arms::TermSet<double> set = arms::everything(arm, random);
       set.terms.push_back(term);
       for (Term<double>& t : set.terms) t.coefficient *= 8;
-      Model<double> model;
-      ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-      DualArm dual;
-      ASSERT_EQ(dual.prepare(arm.robot, set), flexcomp::Refusal::none);
-      const Joints q = random.pose(arm.robot);
-      const auto context = arms::random_context(arm.robot, random);
-      flexcomp::Linearisation<double> at;
-      flexcomp::linearise(model, q, context, at);
-      const Vector6<double> expected = dual.at(q, context, place.body == flexcomp::body::point);
-      const Vector6<double> got = flexcomp::exact_column(model, at, term, context);
-      ASSERT_LE((got - expected).norm(), 1e-9 * std::max(expected.norm(), floor_of(term))) << describe(term);
+      compare_last(arm, set, flexcomp::exact_column, 1, random, worst);
     }
   }
 }
@@ -178,35 +151,29 @@ TEST(ExactColumn, CurveCoefficientsAreDualToo) {
   arms::Random random(12);
   for (int n = 0; n < 200; ++n) {
     arms::TermSet<double> set = arms::table1(arm);
-    std::vector<double> c(24);
-    for (double& v : c) v = random.around(3e-4);
-    const std::uint16_t table = set.add_curve(c);
-    set.add(arms::on_link(3, flexcomp::slot::theta), Basis::curve, 1.0, 2).table = table;
+    const std::vector<double> c = random.around(3e-4, 24);
+    set.add(arms::on_link(3, flexcomp::slot::theta), Basis::curve, 1.0, 2).table = set.add_curve(c);
     const std::size_t k = random.below(c.size());
     arms::TermSet<Jet> jets = arms::as<Jet>(set);
     jets.values[k].v[0] = 1;
-    Model<Jet> dual;
-    ASSERT_EQ(dual.prepare(arm.robot, jets.list()), flexcomp::Refusal::none);
+    const Model<Jet> dual = arms::prepared(arm.robot, jets);
     Joints q = random.pose(arm.robot);
     // The spline of c_k reaches two intervals either side of its knot.
     q[2] = 2 * flexcomp::pi / 24 * (static_cast<double>(k) + random.around(2.5));
     const auto context = flexcomp::default_context<double>(arm.robot);
-    std::array<Jet, 6> joints;
-    for (std::size_t i = 0; i < 6; ++i) joints[i] = Jet(q[i]);
     flexcomp::Workspace<Jet> ws;
-    const Vector6<double> expected = derivative(flexcomp::forward(dual, joints, as_jets(context), ws));
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model, q, context, at);
-    const double weight = arms::cardinal_spline(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
+    const Vector6<double> expected =
+        derivative(flexcomp::forward(dual, arms::as<Jet>(q), arms::as<Jet>(context), ws));
+    const auto model = arms::prepared(arm.robot, set);
+    const auto at = arms::linearised(model, q, context);
+    const double weight = plain::cardinal_spline(q[2] * 24 / (2 * flexcomp::pi) - static_cast<double>(k));
     const Vector6<double> got = flexcomp::screw(model, at, arms::on_link(3, flexcomp::slot::theta)) * weight;
     ASSERT_LE((got - expected).norm(), 1e-12);
   }
 }
 
 TEST(Column, IsExactForConstantTermsWithoutLoadEffects) {
-  Worst worst;
+  double worst = 0;
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(13);
     for (const Place place : arms::all_places()) {
@@ -218,25 +185,11 @@ TEST(Column, IsExactForConstantTermsWithoutLoadEffects) {
         set.add(arms::on_link(2, flexcomp::slot::theta), Basis::sine, 1e-4, 1, 1.0);
         set.add(arms::on_link(4, flexcomp::slot::gamma), Basis::cosine, 1e-4, 3, 2.0);
         set.terms.push_back(term);
-        Model<double> model;
-        ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-        DualArm dual;
-        ASSERT_EQ(dual.prepare(arm.robot, set), flexcomp::Refusal::none);
-        for (int n = 0; n < 5; ++n) {
-          const Joints q = random.pose(arm.robot);
-          const auto context = arms::random_context(arm.robot, random);
-          flexcomp::Linearisation<double> at;
-          flexcomp::linearise(model, q, context, at);
-          const Vector6<double> expected = dual.at(q, context, place.body == flexcomp::body::point);
-          const Vector6<double> got = flexcomp::column(model, at, term, context);
-          const double relative = (got - expected).norm() / std::max(expected.norm(), floor_of(term));
-          worst.take(relative, term);
-          ASSERT_LE(relative, 1e-9) << describe(term);
-        }
+        compare_last(arm, set, flexcomp::column, 5, random, worst);
       }
     }
   }
-  std::printf("[ measured ] column() without load effects, relative: %.1e\n", worst.relative);
+  std::printf("[ measured ] column() without load effects, relative: %.1e\n", worst);
 }
 
 struct Neglected {
@@ -249,15 +202,13 @@ struct Neglected {
 Neglected neglected(const arms::Arm& arm, double payload_kg) {
   arms::Random random(14);
   const arms::TermSet<double> set = arms::table1(arm);
-  Model<double> model;
-  EXPECT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+  const auto model = arms::prepared(arm.robot, set);
   auto context = flexcomp::default_context<double>(arm.robot);
   context.payload_kg = payload_kg;
   Neglected most;
   for (int n = 0; n < 2000; ++n) {
     const Joints q = random.pose(arm.robot);
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model, q, context, at);
+    const auto at = arms::linearised(model, q, context);
     for (const Term<double>& term : set.terms) {
       const Vector6<double> exact = flexcomp::exact_column(model, at, term, context);
       const Vector6<double> off = flexcomp::column(model, at, term, context) - exact;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <functional>
+#include <string>
 
 #include <gtest/gtest.h>
 
-#include "support/arms.hpp"
-#include "support/plain_arm.hpp"
+#include "support/plain_case.hpp"
 
 namespace {
 
@@ -23,31 +25,6 @@ namespace slot = flexcomp::slot;
 /// Room for more than a controller holds: every effect at once.
 using Wide = Model<double, 6, flexcomp::Capacity<256, 16, 2048>>;
 
-plain::Nominal nominal_of(const arms::Robot& robot) {
-  plain::Nominal n;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const flexcomp::NominalLink& l = robot.links[i];
-    n.links[i] = {l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad};
-  }
-  n.gravity = plain::Vector(robot.gravity_m_s2[0], robot.gravity_m_s2[1], robot.gravity_m_s2[2]);
-  n.tool_xyz = plain::Vector(robot.tool_xyz_m[0], robot.tool_xyz_m[1], robot.tool_xyz_m[2]);
-  n.tool_wxyz = robot.tool_wxyz;
-  n.reference_temperature_c = robot.reference_temperature_c;
-  return n;
-}
-
-plain::Situation situation_of(const flexcomp::Context<double>& c) {
-  plain::Situation s;
-  s.payload_kg = c.payload_kg;
-  s.payload_com = plain::Vector(c.payload_com_m[0], c.payload_com_m[1], c.payload_com_m[2]);
-  s.force_n = plain::Vector(c.force_n[0], c.force_n[1], c.force_n[2]);
-  s.temperature_c = c.temperature_c;
-  s.time_s = c.time_s;
-  s.direction = c.direction;
-  s.relative_speed = c.relative_speed;
-  return s;
-}
-
 /// Effects by name to terms: the table of docs/effects.md.
 arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nominal) {
   arms::TermSet<double> set;
@@ -61,12 +38,9 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
     set.add(place(i, slot::alpha), Basis::one, g.alpha);
     set.add(place(i, slot::beta), Basis::one, g.beta);
   }
-  const auto six = [](const plain::Small& v) {
-    return std::array<double, 6>{v.x, v.y, v.z, v.rx, v.ry, v.rz};
-  };
   for (std::uint8_t k = 0; k < 6; ++k) {
-    set.add(on_base(k), Basis::one, six(t.base)[k]);
-    set.add(on_tool(k), Basis::one, six(t.tool)[k]);
+    set.add(on_base(k), Basis::one, plain::six(t.base)[k]);
+    set.add(on_tool(k), Basis::one, plain::six(t.tool)[k]);
   }
   for (const auto& x : t.joint_compliance)
     set.add(place(x.joint, slot::theta), Basis::load_torque, x.rad_per_nm, index(x.joint));
@@ -82,8 +56,8 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
     set.add(place(x.joint, slot::theta), Basis::cosine, x.cos_rad, index(x.joint), x.order);
   }
   for (const auto& x : t.joint_curve) {
-    const std::uint16_t table = set.add_curve(x.coefficients);
-    set.add(place(x.joint, slot::theta), Basis::curve, 1.0, index(x.joint)).table = table;
+    set.add(place(x.joint, slot::theta), Basis::curve, 1.0, index(x.joint)).table =
+        set.add_curve(x.coefficients);
   }
   for (const auto& x : t.backlash)
     set.add(place(x.joint, slot::theta), Basis::direction, x.half_gap_rad, index(x.joint));
@@ -111,7 +85,7 @@ arms::TermSet<double> terms_of(const plain::Truth& t, const plain::Nominal& nomi
     }
   }
   for (const auto& x : t.base_drift)
-    for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::time, six(x.per_s)[k]);
+    for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::time, plain::six(x.per_s)[k]);
   for (const auto& x : t.base_compliance) {
     set.add(on_base(slot::rx), Basis::base_moment_x, x.rx_rad_per_nm, 0, x.pivot_z);
     set.add(on_base(slot::ry), Basis::base_moment_y, x.ry_rad_per_nm, 0, x.pivot_z);
@@ -154,8 +128,7 @@ plain::Truth everything(arms::Random& random) {
     t.gear_harmonic.push_back(
         {joint(), static_cast<double>(1 + random.below(8)), random.around(3e-4), random.around(3e-4)});
     t.gear_harmonic.push_back({joint(), 100 + random.around(1), random.around(3e-4), random.around(3e-4)});
-    std::vector<double> c(6 + random.below(60));
-    for (double& v : c) v = random.around(5e-4);
+    const std::vector<double> c = random.around(5e-4, 6 + random.below(60));
     t.joint_curve.push_back({joint(), c});
     t.backlash.push_back({joint(), random.uniform(0, 3e-4)});
     t.readout_lag.push_back({joint(), random.uniform(0, 2e-3)});
@@ -187,7 +160,7 @@ struct Difference {
 template <class M>
 void compare(const M& model, const plain::Nominal& nominal, const plain::Truth& truth, const Joints& q,
              const flexcomp::Context<double>& context, Difference& most) {
-  const plain::Result expected = plain::forward(nominal, truth, q, situation_of(context));
+  const plain::Result expected = plain::forward(nominal, truth, q, plain::situation_of(context));
   flexcomp::Workspace<double> ws;
   const flexcomp::Pose<double> pose = flexcomp::forward(model, q, context, ws);
   most.position_m = std::max(most.position_m, (pose.position - plain::origin(expected.pose)).norm());
@@ -199,12 +172,11 @@ void compare(const M& model, const plain::Nominal& nominal, const plain::Truth& 
 TEST(Effects, AllAtOnceAgreeWithPlainMatrices) {
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(61);
-    const plain::Nominal nominal = nominal_of(arm.robot);
+    const plain::Nominal nominal = plain::nominal_of(arm.robot);
     Difference most;
     for (int n = 0; n < 300; ++n) {
       const plain::Truth truth = everything(random);
-      Wide model;
-      ASSERT_EQ(model.prepare(arm.robot, terms_of(truth, nominal).list()), flexcomp::Refusal::none);
+      const auto model = arms::prepared<double, Wide>(arm.robot, terms_of(truth, nominal));
       for (int k = 0; k < 10; ++k)
         compare(model, nominal, truth, random.pose(arm.robot), arms::random_context(arm.robot, random), most);
     }
@@ -216,84 +188,60 @@ TEST(Effects, AllAtOnceAgreeWithPlainMatrices) {
   }
 }
 
+struct NamedEffect {
+  const char* name;
+  std::function<void(plain::Truth&, const plain::Truth&)> copy;
+};
+
+template <class List>
+NamedEffect effect(const char* name, List plain::Truth::*list) {
+  return {name, [list](plain::Truth& to, const plain::Truth& from) { to.*list = from.*list; }};
+}
+
 TEST(Effects, EachAloneAgreesWithPlainMatrices) {
+  using plain::Truth;
+  const NamedEffect effects[] = {effect("joint_compliance", &Truth::joint_compliance),
+                                 effect("link_gravity", &Truth::link_gravity),
+                                 effect("nonlinear_compliance", &Truth::nonlinear_compliance),
+                                 effect("gear_harmonic", &Truth::gear_harmonic),
+                                 effect("joint_curve", &Truth::joint_curve),
+                                 effect("backlash", &Truth::backlash),
+                                 effect("readout_lag", &Truth::readout_lag),
+                                 effect("encoder_scale", &Truth::encoder_scale),
+                                 effect("joint_coupling", &Truth::joint_coupling),
+                                 effect("axis_wobble", &Truth::axis_wobble),
+                                 effect("link_bending", &Truth::link_bending),
+                                 effect("thermal_growth", &Truth::thermal_growth),
+                                 effect("base_drift", &Truth::base_drift),
+                                 effect("base_compliance", &Truth::base_compliance),
+                                 effect("reflector_slip", &Truth::reflector_slip),
+                                 effect("grid", &Truth::grid),
+                                 effect("payload_error", &Truth::payload_error)};
   // One at a time, so that two faults cannot hide each other; each must also do something.
   for (const arms::Arm& arm : arms::all()) {
-    const plain::Nominal nominal = nominal_of(arm.robot);
-    for (int which = 0; which < 17; ++which) {
+    const plain::Nominal nominal = plain::nominal_of(arm.robot);
+    for (const NamedEffect& effect : effects) {
+      SCOPED_TRACE(std::string(arm.name) + " " + effect.name);
       arms::Random random(62);
       Difference most;
-      Difference effect;
+      Difference size;
       for (int n = 0; n < 50; ++n) {
-        const plain::Truth all = everything(random);
-        plain::Truth one;
-        one.geometric = all.geometric;
-        one.joint_compliance = which == 16 ? all.joint_compliance : one.joint_compliance;
-        const plain::Truth without = one;
-        switch (which) {
-          case 0:
-            one.joint_compliance = all.joint_compliance;
-            break;
-          case 1:
-            one.link_gravity = all.link_gravity;
-            break;
-          case 2:
-            one.nonlinear_compliance = all.nonlinear_compliance;
-            break;
-          case 3:
-            one.gear_harmonic = all.gear_harmonic;
-            break;
-          case 4:
-            one.joint_curve = all.joint_curve;
-            break;
-          case 5:
-            one.backlash = all.backlash;
-            break;
-          case 6:
-            one.readout_lag = all.readout_lag;
-            break;
-          case 7:
-            one.encoder_scale = all.encoder_scale;
-            break;
-          case 8:
-            one.joint_coupling = all.joint_coupling;
-            break;
-          case 9:
-            one.axis_wobble = all.axis_wobble;
-            break;
-          case 10:
-            one.link_bending = all.link_bending;
-            break;
-          case 11:
-            one.thermal_growth = all.thermal_growth;
-            break;
-          case 12:
-            one.base_drift = all.base_drift;
-            break;
-          case 13:
-            one.base_compliance = all.base_compliance;
-            break;
-          case 14:
-            one.reflector_slip = all.reflector_slip;
-            break;
-          case 15:
-            one.grid = all.grid;
-            break;
-          default:
-            one.payload_error = all.payload_error;
-            break;
-        }
-        Wide model;
-        ASSERT_EQ(model.prepare(arm.robot, terms_of(one, nominal).list()), flexcomp::Refusal::none);
+        const Truth all = everything(random);
+        Truth without;
+        without.geometric = all.geometric;
+        // An error of the payload shows where something gives way to it.
+        if (std::strcmp(effect.name, "payload_error") == 0) without.joint_compliance = all.joint_compliance;
+        Truth one = without;
+        effect.copy(one, all);
+        const auto model = arms::prepared<double, Wide>(arm.robot, terms_of(one, nominal));
         const Joints q = random.pose(arm.robot);
         const auto context = arms::random_context(arm.robot, random);
         compare(model, nominal, one, q, context, most);
-        compare(model, nominal, without, q, context, effect);
+        compare(model, nominal, without, q, context, size);
       }
-      EXPECT_LE(most.position_m, 1e-13) << arm.name << " effect " << which;
-      EXPECT_LE(most.rotation, 1e-13) << arm.name << " effect " << which;
-      EXPECT_GT(effect.position_m + effect.rotation + effect.point_m, 1e-6)
-          << arm.name << " effect " << which;
+      EXPECT_LE(most.position_m, 1e-13);
+      EXPECT_LE(most.rotation, 1e-13);
+      EXPECT_GT(size.position_m + size.rotation + size.point_m, 1e-6);
     }
   }
 }
@@ -306,11 +254,10 @@ TEST(Effects, GravityInAnyDirection) {
     for (int n = 0; n < 200; ++n) {
       arms::Robot robot = arm.robot;
       robot.gravity_m_s2 = {random.around(9.81), random.around(9.81), random.around(9.81)};
-      const plain::Nominal nominal = nominal_of(robot);
+      const plain::Nominal nominal = plain::nominal_of(robot);
       plain::Truth truth = everything(random);
       truth.link_gravity.clear();  // refused away from the axis of joint 1
-      Wide model;
-      ASSERT_EQ(model.prepare(robot, terms_of(truth, nominal).list()), flexcomp::Refusal::none);
+      const auto model = arms::prepared<double, Wide>(robot, terms_of(truth, nominal));
       compare(model, nominal, truth, random.pose(robot), arms::random_context(robot, random), most);
     }
     EXPECT_LE(most.position_m, 1e-13) << arm.name;
@@ -341,12 +288,9 @@ TEST(Effects, LinkGravityIsRefusedAwayFromTheAxisOfJoint1) {
 double lever(const arms::Robot& robot, const Joints& q, std::size_t joint, std::size_t distal) {
   arms::TermSet<double> set;
   set.add_lever(on_link(joint + 1, slot::theta), 1.0, joint, distal);
-  Model<double> model;
-  EXPECT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
-  flexcomp::Linearisation<double> at;
+  const auto model = arms::prepared(robot, set);
   const auto context = flexcomp::default_context<double>(robot);
-  flexcomp::linearise(model, q, context, at);
-  return flexcomp::basis_value(model, set.terms[0], context, at.unloaded);
+  return flexcomp::basis_value(model, set.terms[0], context, arms::linearised(model, q, context).unloaded);
 }
 
 TEST(Effects, LeversOfTheTx60lAreTheSinesOfThePaper) {
@@ -368,6 +312,13 @@ TEST(Effects, ALeverShorterThanAMillimetreIsZero) {
 
 TEST(Effects, PositiveCoefficientsSag) {
   // Every arm stretched out sideways: the tool goes down with k > 0 and with compliance > 0, on the ceiling up.
+  arms::TermSet<double> terms;
+  terms.add_lever(on_link(2, slot::theta), 1e-3, 1, 2);
+  terms.add_lever(on_link(2, slot::theta), 1e-3, 2, 4);
+  terms.add_lever(on_link(3, slot::theta), 1e-3, 2, 4);
+  terms.add(on_link(2, slot::theta), Basis::load_torque, 1e-5, 1);
+  terms.add(on_link(3, slot::theta), Basis::load_torque, 1e-5, 2);
+  terms.add(on_link(2, slot::theta), Basis::load_torque_cubed, 1e-7, 1);
   for (const arms::Arm& arm : arms::all()) {
     for (const double gravity : {-9.81, 9.81}) {
       arms::Robot robot = arm.robot;
@@ -375,19 +326,12 @@ TEST(Effects, PositiveCoefficientsSag) {
       const bool upright = arm.robot.links[1].theta_rad < -1;  // the Staubli's zero is straight up
       for (const double side : {1.0, -1.0}) {
         Joints q{0.4, upright ? side * 1.2 : (side > 0 ? -0.3 : -2.8), 0.2 * side, 0.3, 0.5, 0.1};
-        for (int which = 0; which < 6; ++which) {
+        for (std::size_t which = 0; which < terms.terms.size(); ++which) {
           arms::TermSet<double> set;
-          if (which == 0) set.add_lever(on_link(2, slot::theta), 1e-3, 1, 2);
-          if (which == 1) set.add_lever(on_link(2, slot::theta), 1e-3, 2, 4);
-          if (which == 2) set.add_lever(on_link(3, slot::theta), 1e-3, 2, 4);
-          if (which == 3) set.add(on_link(2, slot::theta), Basis::load_torque, 1e-5, 1);
-          if (which == 4) set.add(on_link(3, slot::theta), Basis::load_torque, 1e-5, 2);
-          if (which == 5) set.add(on_link(2, slot::theta), Basis::load_torque_cubed, 1e-7, 1);
-          Model<double> model;
-          ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
-          flexcomp::Workspace<double> ws;
+          set.terms = {terms.terms[which]};
+          const auto model = arms::prepared(robot, set);
           const auto context = flexcomp::default_context<double>(robot);
-          const double sag = flexcomp::forward(model, q, context, ws).position.z() -
+          const double sag = arms::forward(model, q, context).position.z() -
                              flexcomp::nominal_forward(model, q).position.z();
           EXPECT_GT(sag * gravity, 0) << arm.name << " side " << side << " term " << which;
         }
@@ -403,12 +347,10 @@ TEST(Effects, TorqueIsTheLoadTimesItsLever) {
   robot.payload_kg = 1;
   arms::TermSet<double> set;
   for (std::size_t i = 0; i < 6; ++i) set.add(on_link(i + 1, slot::theta), Basis::load_torque, 1e-9, i);
-  Model<double> model;
-  ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
+  const auto model = arms::prepared(robot, set);
   auto context = flexcomp::default_context<double>(robot);
   const Joints q{0, 90 * arms::deg, 0, 0, 0, 0};
-  flexcomp::Linearisation<double> at;
-  flexcomp::linearise(model, q, context, at);
+  auto at = arms::linearised(model, q, context);
   const auto torque = [&](std::size_t i) {
     return flexcomp::basis_value(model, set.terms[i], context, at.unloaded);
   };
@@ -426,32 +368,27 @@ TEST(Effects, TorqueIsTheLoadTimesItsLever) {
 TEST(Effects, BacklashStaysBehindTheMotion) {
   arms::TermSet<double> set;
   set.add(on_link(1, slot::theta), Basis::direction, 1e-3, 0);
-  Model<double> model;
   const arms::Robot robot = arms::tx60l();
-  ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
+  const auto model = arms::prepared(robot, set);
   const Joints q{0.2, 0.9, 0.3, 0, 0.4, 0};
   for (const double direction : {1.0, -1.0, 0.0}) {
     auto context = flexcomp::default_context<double>(robot);
     context.direction[0] = direction;
     Joints behind = q;
     behind[0] -= 1e-3 * direction;
-    flexcomp::Workspace<double> ws;
     const auto expected = flexcomp::nominal_forward(model, behind);
-    EXPECT_LE((flexcomp::forward(model, q, context, ws).position - expected.position).norm(), 1e-15);
+    EXPECT_LE((arms::forward(model, q, context).position - expected.position).norm(), 1e-15);
   }
 }
 
 TEST(Effects, JointCurveIsThePeriodicSplineOfEffectsMd) {
   arms::Random random(66);
   for (const std::size_t size : {6U, 7U, 18U, 100U, 256U}) {
-    std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
+    const std::vector<double> c = random.around(1, size);
     arms::TermSet<double> set;
-    const std::uint16_t table = set.add_curve(c);
-    set.add(on_link(1, slot::theta), Basis::curve, 1.0, 0).table = table;
-    Model<double> model;
+    set.add(on_link(1, slot::theta), Basis::curve, 1.0, 0).table = set.add_curve(c);
     const arms::Robot robot = arms::ur10();
-    ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(robot, set);
     const auto context = flexcomp::default_context<double>(robot);
     flexcomp::Workspace<double> ws;
     const auto value = [&](double q) {
@@ -476,8 +413,7 @@ TEST(Effects, JointCurveIsThePeriodicSplineOfEffectsMd) {
 TEST(Effects, CurvesTimesAFactor) {
   const arms::Arm& arm = arms::all()[0];
   arms::Random random(67);
-  std::vector<double> c(12);
-  for (double& v : c) v = random.around(1);
+  const std::vector<double> c = random.around(1, 12);
   arms::TermSet<double> set;
   const std::uint16_t table = set.add_curve(c);
   using flexcomp::Factor;
@@ -487,17 +423,15 @@ TEST(Effects, CurvesTimesAFactor) {
     t.factor = f;
   }
   set.add(arms::on_load(slot::mass), Basis::one, 0.25);
-  Model<double> model;
-  ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
-  const plain::Nominal nominal = nominal_of(arm.robot);
+  const auto model = arms::prepared(arm.robot, set);
+  const plain::Nominal nominal = plain::nominal_of(arm.robot);
   plain::Truth truth;
   truth.payload_error.push_back({0.25, plain::Vector::Zero()});
   for (int n = 0; n < 200; ++n) {
     const Joints q = random.pose(arm.robot);
     const auto context = arms::random_context(arm.robot, random);
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model, q, context, at);
-    const plain::Result plain_arm = plain::forward(nominal, truth, q, situation_of(context));
+    const auto at = arms::linearised(model, q, context);
+    const plain::Result plain_arm = plain::forward(nominal, truth, q, plain::situation_of(context));
     // The factor `payload` is the mass that the context names, without payload_error: what a table was
     // measured over is what a controller is told.
     const double factor[4] = {1, plain_arm.torque[2], context.temperature_c - 20, context.payload_kg};
@@ -516,9 +450,8 @@ TEST(Effects, GridHoldsItsEndsAndMeetsItsNodes) {
   set.tables.back().row_joint = 1;
   set.tables.back().column_covariate = flexcomp::Covariate::payload;
   set.add(on_link(1, slot::theta), Basis::grid, 1.0).table = table;
-  Model<double> model;
   const arms::Robot robot = arms::ur10();
-  ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
+  const auto model = arms::prepared(robot, set);
   auto context = flexcomp::default_context<double>(robot);
   flexcomp::Workspace<double> ws;
   const auto value = [&](double q, double kg) {
@@ -552,12 +485,10 @@ TEST(Effects, BaseMomentTurnsAboutItsPivot) {
     arms::TermSet<double> set;
     set.add(on_base(slot::ry), Basis::base_moment_y, 1e-6, 0, pivot);
     set.add(on_base(slot::rx), Basis::base_moment_x, 1e-6, 0, pivot);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(robot, set);
     auto context = flexcomp::default_context<double>(robot);
     context.force_n = {7, 0, 0};
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model, Joints{}, context, at);
+    const auto at = arms::linearised(model, Joints{}, context);
     EXPECT_NEAR(flexcomp::basis_value(model, set.terms[0], context, at.unloaded),
                 2 * 9.8 * 0.5 + 7 * (0.3 - pivot), 1e-13);
     EXPECT_NEAR(flexcomp::basis_value(model, set.terms[1], context, at.unloaded), 0, 1e-13);
@@ -574,10 +505,8 @@ TEST(Effects, TorquesAreTakenBeforeAnyEffectBends) {
   two.add(on_link(4, slot::a), Basis::load_torque, 1e-2, 3);
   two.add(on_link(3, slot::theta), Basis::sine, 0.1, 2, 1.0);
   two.add(on_base(slot::rx), Basis::time, 1e-3);
-  Model<double> first;
-  Model<double> second;
-  ASSERT_EQ(first.prepare(arm.robot, one.list()), flexcomp::Refusal::none);
-  ASSERT_EQ(second.prepare(arm.robot, two.list()), flexcomp::Refusal::none);
+  const auto first = arms::prepared(arm.robot, one);
+  const auto second = arms::prepared(arm.robot, two);
   for (int n = 0; n < 100; ++n) {
     const Joints q = random.pose(arm.robot);
     const auto context = arms::random_context(arm.robot, random);
@@ -592,19 +521,16 @@ TEST(Effects, TorquesAreTakenBeforeAnyEffectBends) {
 TEST(Effects, OrderOfTermsDoesNotMatterBeyondRounding) {
   const arms::Arm& arm = arms::all()[1];
   arms::Random random(70);
-  const plain::Nominal nominal = nominal_of(arm.robot);
+  const plain::Nominal nominal = plain::nominal_of(arm.robot);
   arms::TermSet<double> set = terms_of(everything(random), nominal);
-  Wide forwards;
-  Wide backwards;
-  ASSERT_EQ(forwards.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+  const auto forwards = arms::prepared<double, Wide>(arm.robot, set);
   std::reverse(set.terms.begin(), set.terms.end());
-  ASSERT_EQ(backwards.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+  const auto backwards = arms::prepared<double, Wide>(arm.robot, set);
   for (int n = 0; n < 100; ++n) {
     const Joints q = random.pose(arm.robot);
     const auto context = arms::random_context(arm.robot, random);
-    flexcomp::Workspace<double> ws;
-    const auto a = flexcomp::forward(forwards, q, context, ws);
-    const auto b = flexcomp::forward(backwards, q, context, ws);
+    const auto a = arms::forward(forwards, q, context);
+    const auto b = arms::forward(backwards, q, context);
     ASSERT_LE((a.position - b.position).norm(), 1e-14);
   }
 }
@@ -624,13 +550,15 @@ TEST(Effects, WhatAModelRefuses) {
     return model.add(t);
   };
   using flexcomp::Refusal;
-  EXPECT_EQ(refusal({7, 0}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({1, 6}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({flexcomp::body::base, 6}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({flexcomp::body::tool, 6}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({flexcomp::body::load, 4}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({flexcomp::body::point, 3}, Basis::one), Refusal::bad_place);
-  EXPECT_EQ(refusal({0x43, 0}, Basis::one), Refusal::bad_place);
+  for (const flexcomp::Place place : {flexcomp::Place{7, 0},
+                                      {1, 6},
+                                      {flexcomp::body::base, 6},
+                                      {flexcomp::body::tool, 6},
+                                      {flexcomp::body::load, 4},
+                                      {flexcomp::body::point, 3},
+                                      {0x43, 0}}) {
+    EXPECT_EQ(refusal(place, Basis::one), Refusal::bad_place) << int{place.body} << " " << int{place.slot};
+  }
   EXPECT_EQ(refusal(arms::on_load(slot::mass), Basis::time), Refusal::bad_place);
   EXPECT_EQ(refusal(on_base(slot::x), Basis::thermal), Refusal::bad_place);
   EXPECT_EQ(refusal(on_link(1, slot::theta), Basis::thermal), Refusal::bad_place);

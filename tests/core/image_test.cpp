@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -27,6 +28,8 @@ using flexcomp::Table;
 using flexcomp::Term;
 using Bytes = std::vector<std::uint8_t>;
 
+const arms::Robot tx60l = arms::tx60l();
+
 ImageHeader header_of(const arms::Robot& robot, std::uint32_t sequence = 7) {
   ImageHeader h;
   h.sequence = sequence;
@@ -36,7 +39,7 @@ ImageHeader header_of(const arms::Robot& robot, std::uint32_t sequence = 7) {
 }
 
 template <class S>
-Bytes encode(const TermSet<S>& set, const ImageHeader& header) {
+Bytes encode(const TermSet<S>& set, const ImageHeader& header = header_of(tx60l)) {
   Bytes bytes(flexcomp::image_size(set.list()));
   EXPECT_EQ(flexcomp::encode_image(set.list(), header, bytes.data(), bytes.size()), bytes.size());
   return bytes;
@@ -46,29 +49,34 @@ void fix_crc(Bytes& bytes) {
   flexcomp::store_u32(bytes.data() + bytes.size() - 4, flexcomp::crc32(bytes.data(), bytes.size() - 4));
 }
 
-/// Checks from memory of exactly this size, so that a sanitizer sees any byte read beyond it.
-Refusal check(const Bytes& bytes, const arms::Robot& robot) {
-  const std::unique_ptr<std::uint8_t[]> exact(new std::uint8_t[bytes.size()]);
+/// Memory of exactly this size, so that a sanitizer sees any byte read beyond it.
+std::unique_ptr<std::uint8_t[]> exactly(const Bytes& bytes) {
+  std::unique_ptr<std::uint8_t[]> exact(new std::uint8_t[bytes.size()]);
   std::copy(bytes.begin(), bytes.end(), exact.get());
+  return exact;
+}
+
+Refusal check(const Bytes& bytes, const arms::Robot& robot = tx60l) {
   ImageHeader read;
   const ImageHeader expected = header_of(robot);
-  return flexcomp::check_image(exact.get(), bytes.size(), expected.nominal_hash, expected.name_hash, read);
+  return flexcomp::check_image(exactly(bytes).get(), bytes.size(), expected.nominal_hash, expected.name_hash,
+                               read);
 }
 
 /// Check and build, as a controller does.
 template <class S>
-Refusal load(const Bytes& bytes, const arms::Robot& robot, Model<S>& model) {
+Refusal load(const Bytes& bytes, Model<S>& model, const arms::Robot& robot = tx60l) {
   const Refusal r = check(bytes, robot);
   if (r != Refusal::none) return r;
-  const std::unique_ptr<std::uint8_t[]> exact(new std::uint8_t[bytes.size()]);
-  std::copy(bytes.begin(), bytes.end(), exact.get());
-  return flexcomp::model_from_image(exact.get(), bytes.size(), robot, model);
+  return flexcomp::model_from_image(exactly(bytes).get(), bytes.size(), robot, model);
 }
 
-Refusal load(const Bytes& bytes, const arms::Robot& robot) {
+Refusal load(const Bytes& bytes) {
   const auto model = std::make_unique<Model<double>>();
-  return load(bytes, robot, *model);
+  return load(bytes, *model);
 }
+
+Refusal load(const TermSet<double>& set) { return load(encode(set)); }
 
 /// Reads an image back into a list.
 template <class S>
@@ -139,12 +147,11 @@ TermSet<double> usual_set() {
 }
 
 TEST(Image, RoundTripIsByteExact) {
-  const arms::Robot robot = arms::tx60l();
   arms::Random random(82);
   for (int n = 0; n < 2000; ++n) {
     const TermSet<double> set = any_list(random);
-    const Bytes bytes = encode(set, header_of(robot, static_cast<std::uint32_t>(random.bits())));
-    ASSERT_EQ(check(bytes, robot), Refusal::none);
+    const Bytes bytes = encode(set, header_of(tx60l, static_cast<std::uint32_t>(random.bits())));
+    ASSERT_EQ(check(bytes), Refusal::none);
     ImageHeader header;
     ASSERT_EQ(flexcomp::read_header(bytes.data(), bytes.size(), header), Refusal::none);
     ASSERT_EQ(header.terms, set.terms.size());
@@ -201,7 +208,7 @@ TEST(Image, TheModelItGivesIsTheOneThatWasSent) {
     const auto direct = std::make_unique<Model<double>>();
     const auto sent = std::make_unique<Model<double>>();
     ASSERT_EQ(direct->prepare(arm.robot, set.list()), Refusal::none);
-    ASSERT_EQ(load(encode(set, header_of(arm.robot)), arm.robot, *sent), Refusal::none);
+    ASSERT_EQ(load(encode(set, header_of(arm.robot)), *sent, arm.robot), Refusal::none);
     for (int n = 0; n < 1000; ++n) {
       const auto q = random.pose(arm.robot);
       const auto context = arms::random_context(arm.robot, random);
@@ -226,8 +233,8 @@ TEST(Image, AModelIsPreparedAnewFromEachImage) {
   before.terms.push_back(bad);
   ASSERT_EQ(used->prepare(arm.robot, before.list()), Refusal::bad_place);
   const Bytes bytes = encode(arms::table1_geometry(arm), header_of(arm.robot));
-  ASSERT_EQ(load(bytes, arm.robot, *used), Refusal::none);
-  ASSERT_EQ(load(bytes, arm.robot, *fresh), Refusal::none);
+  ASSERT_EQ(load(bytes, *used, arm.robot), Refusal::none);
+  ASSERT_EQ(load(bytes, *fresh, arm.robot), Refusal::none);
   for (int n = 0; n < 100; ++n) {
     const auto q = random.pose(arm.robot);
     const auto context = arms::random_context(arm.robot, random);
@@ -236,48 +243,44 @@ TEST(Image, AModelIsPreparedAnewFromEachImage) {
 }
 
 TEST(Image, EveryTruncationIsRefused) {
-  const arms::Robot robot = arms::tx60l();
-  const Bytes whole = encode(usual_set(), header_of(robot));
-  ASSERT_EQ(check(whole, robot), Refusal::none);
+  const Bytes whole = encode(usual_set());
+  ASSERT_EQ(check(whole), Refusal::none);
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const Bytes part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
-    ASSERT_EQ(check(part, robot), Refusal::truncated) << size;
+    ASSERT_EQ(check(part), Refusal::truncated) << size;
   }
   Bytes longer = whole;
   longer.push_back(0);
-  EXPECT_EQ(check(longer, robot), Refusal::bad_length);
+  EXPECT_EQ(check(longer), Refusal::bad_length);
 }
 
 TEST(Image, EveryFlippedBitIsRefused) {
-  const arms::Robot robot = arms::tx60l();
-  Bytes bytes = encode(usual_set(), header_of(robot));
+  Bytes bytes = encode(usual_set());
   for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
     const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
     bytes[bit / 8] = static_cast<std::uint8_t>(bytes[bit / 8] ^ mask);
-    ASSERT_NE(check(bytes, robot), Refusal::none) << bit;
+    ASSERT_NE(check(bytes), Refusal::none) << bit;
     bytes[bit / 8] = static_cast<std::uint8_t>(bytes[bit / 8] ^ mask);
   }
 }
 
 TEST(Image, AnotherRobotOrAnotherGeometryIsRefused) {
-  const arms::Robot robot = arms::tx60l();
-  const Bytes bytes = encode(usual_set(), header_of(robot));
-  arms::Robot longer = robot;
+  const Bytes bytes = encode(usual_set());
+  arms::Robot longer = tx60l;
   longer.links[3].d_m += 1e-6;
   EXPECT_EQ(check(bytes, longer), Refusal::wrong_nominal);
-  ImageHeader other = header_of(robot);
+  ImageHeader other = header_of(tx60l);
   other.name_hash = flexcomp::name_hash("Arm", 3);
-  EXPECT_EQ(check(encode(usual_set(), other), robot), Refusal::wrong_robot);
+  EXPECT_EQ(check(encode(usual_set(), other)), Refusal::wrong_robot);
 }
 
 TEST(Image, HeaderFieldsAreChecked) {
-  const arms::Robot robot = arms::tx60l();
-  const Bytes good = encode(usual_set(), header_of(robot));
+  const Bytes good = encode(usual_set());
   const auto with = [&](std::size_t at, std::uint8_t value) {
     Bytes b = good;
     b[at] = value;
     fix_crc(b);
-    return load(b, robot);
+    return load(b);
   };
   EXPECT_EQ(with(0, 'f'), Refusal::bad_magic);
   EXPECT_EQ(with(4, 2), Refusal::schema);
@@ -289,85 +292,72 @@ TEST(Image, HeaderFieldsAreChecked) {
   EXPECT_EQ(with(84, static_cast<std::uint8_t>(good[84] + 1)), Refusal::bad_length);
 }
 
-/// The image of one term, altered at a byte of its record.
-Bytes one_term(const Term<double>& t, const arms::Robot& robot) {
-  TermSet<double> set;
-  set.terms.push_back(t);
-  return encode(set, header_of(robot));
-}
-
-TEST(Image, RecordsAreChecked) {
-  const arms::Robot robot = arms::tx60l();
+/// A term that is accepted.
+Term<double> good_term() {
   Term<double> t;
   t.place = {2, 0};
   t.basis = Basis::load_torque;
   t.joint = 1;
   t.coefficient = 1e-5;
-  ASSERT_EQ(load(one_term(t, robot), robot), Refusal::none);
+  return t;
+}
 
-  Term<double> unknown = t;
-  unknown.basis = static_cast<Basis>(flexcomp::basis_count);
-  EXPECT_EQ(load(one_term(unknown, robot), robot), Refusal::unknown_basis);
-  Term<double> beyond = t;
-  beyond.joint = 6;
-  EXPECT_EQ(load(one_term(beyond, robot), robot), Refusal::bad_value);
-  Term<double> nowhere = t;
-  nowhere.place = {7, 0};
-  EXPECT_EQ(load(one_term(nowhere, robot), robot), Refusal::bad_place);
+/// The image of that term with a change.
+Bytes one_term(const std::function<void(Term<double>&)>& change) {
+  TermSet<double> set;
+  set.terms.push_back(good_term());
+  change(set.terms.back());
+  return encode(set);
+}
+
+TEST(Image, RecordsAreChecked) {
+  using T = Term<double>&;
+  const Bytes b = one_term([](T) {});
+  ASSERT_EQ(load(b), Refusal::none);
+  const auto with = [](const std::function<void(T)>& change) { return load(one_term(change)); };
+  EXPECT_EQ(with([](T t) { t.basis = static_cast<Basis>(flexcomp::basis_count); }), Refusal::unknown_basis);
+  EXPECT_EQ(with([](T t) { t.joint = 6; }), Refusal::bad_value);
+  EXPECT_EQ(with([](T t) { t.place = {7, 0}; }), Refusal::bad_place);
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
-    Term<double> c = t;
-    c.coefficient = bad;
-    EXPECT_EQ(load(one_term(c, robot), robot), Refusal::bad_value);
-    Term<double> a = t;
-    a.argument = bad;
-    EXPECT_EQ(load(one_term(a, robot), robot), Refusal::bad_value);
+    EXPECT_EQ(with([=](T t) { t.coefficient = bad; }), Refusal::bad_value);
+    EXPECT_EQ(with([=](T t) { t.argument = bad; }), Refusal::bad_value);
     TermSet<double> table;
     table.add_curve({0, 0, 0, bad, 0, 0});
-    EXPECT_EQ(load(encode(table, header_of(robot)), robot), Refusal::bad_value);
+    EXPECT_EQ(load(table), Refusal::bad_value);
   }
   // A double that no float can hold is a value out of range for a controller of floats.
-  Term<double> huge = t;
-  huge.coefficient = 1e39;
+  const Bytes huge = one_term([](T t) { t.coefficient = 1e39; });
   const auto single = std::make_unique<Model<float>>();
-  EXPECT_EQ(load(one_term(huge, robot), robot, *single), Refusal::bad_value);
-  EXPECT_EQ(load(one_term(huge, robot), robot), Refusal::none);
+  EXPECT_EQ(load(huge, *single), Refusal::bad_value);
+  EXPECT_EQ(load(huge), Refusal::none);
 
   // The distal joint of a lever stands in the image as a number: one that is none is refused.
-  Term<double> lever = t;
-  lever.basis = Basis::link_weight;
-  lever.distal_joint = 2;
-  Bytes bytes = one_term(lever, robot);
-  EXPECT_EQ(load(bytes, robot), Refusal::none);
+  Bytes bytes = one_term([](T t) {
+    t.basis = Basis::link_weight;
+    t.distal_joint = 2;
+  });
+  EXPECT_EQ(load(bytes), Refusal::none);
   for (const double argument : {1.0, 2.5, 6.0, -1.0, 258.0}) {
     flexcomp::store_u64(bytes.data() + flexcomp::image::header_bytes + 16, flexcomp::bits_of(argument));
     fix_crc(bytes);
-    EXPECT_EQ(load(bytes, robot), Refusal::bad_value) << argument;
+    EXPECT_EQ(load(bytes), Refusal::bad_value) << argument;
   }
 
   // What belongs to the measurement is never pushed.
-  for (const flexcomp::Effect e :
-       {flexcomp::Effect::base_drift, flexcomp::Effect::readout_lag, flexcomp::Effect::reflector_slip}) {
-    Term<double> m = t;
-    m.effect = e;
-    EXPECT_EQ(load(one_term(m, robot), robot), Refusal::bad_place);
-  }
+  using flexcomp::Effect;
+  for (const Effect e : {Effect::base_drift, Effect::readout_lag, Effect::reflector_slip})
+    EXPECT_EQ(with([=](T t) { t.effect = e; }), Refusal::bad_place);
   // … also under another name: what follows a clock or a speed would move the arm without a bound per cycle.
-  for (const Basis basis : {Basis::time, Basis::step, Basis::relative_speed}) {
-    Term<double> m = t;
-    m.basis = basis;
-    EXPECT_EQ(load(one_term(m, robot), robot), Refusal::bad_place);
-  }
-  Term<double> point = t;
-  point.place = arms::on_point(0);
-  EXPECT_EQ(load(one_term(point, robot), robot), Refusal::bad_place);
+  for (const Basis basis : {Basis::time, Basis::step, Basis::relative_speed})
+    EXPECT_EQ(with([=](T t) { t.basis = basis; }), Refusal::bad_place);
+  EXPECT_EQ(with([](T t) { t.place = arms::on_point(0); }), Refusal::bad_place);
 
   // A term of another length, a length that runs out of the image, a record of another type.
-  Bytes b = one_term(t, robot);
   const auto altered = [&](std::size_t at, std::uint16_t value) {
     Bytes c = b;
     flexcomp::store_u16(&c[at], value);
     fix_crc(c);
-    return load(c, robot);
+    return load(c);
   };
   EXPECT_EQ(altered(96, 3), Refusal::unknown_record);
   EXPECT_EQ(altered(96, 0), Refusal::unknown_record);
@@ -380,8 +370,7 @@ TEST(Image, RecordsAreChecked) {
 }
 
 TEST(Image, AnUnknownRecordIsSkippedOnlyIfItSaysSo) {
-  const arms::Robot robot = arms::tx60l();
-  const Bytes good = encode(usual_set(), header_of(robot));
+  const Bytes good = encode(usual_set());
   for (const bool optional : {false, true}) {
     Bytes b(good.begin(), good.end() - 4);
     const std::uint8_t record[] = {
@@ -390,119 +379,114 @@ TEST(Image, AnUnknownRecordIsSkippedOnlyIfItSaysSo) {
     b.resize(b.size() + 4);
     flexcomp::store_u32(&b[8], static_cast<std::uint32_t>(b.size()));
     fix_crc(b);
-    EXPECT_EQ(load(b, robot), optional ? Refusal::none : Refusal::unknown_record);
+    EXPECT_EQ(load(b), optional ? Refusal::none : Refusal::unknown_record);
   }
 }
 
 TEST(Image, MoreThanTheModelHoldsIsRefused) {
-  const arms::Robot robot = arms::tx60l();
   using Capacity = flexcomp::DefaultCapacity;
   // Constant terms cost nothing, however many; effects count.
   TermSet<double> set;
   for (std::size_t k = 0; k < 500; ++k) set.add({1, 0}, Basis::one, 1e-6);
   for (std::size_t k = 0; k < Capacity::terms; ++k) set.add({1, 0}, Basis::joint_position, 1e-6);
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::none);
+  EXPECT_EQ(load(set), Refusal::none);
   set.add({1, 0}, Basis::joint_position, 1e-6);
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::too_many_terms);
+  EXPECT_EQ(load(set), Refusal::too_many_terms);
 
   TermSet<double> tables;
   for (std::size_t k = 0; k < Capacity::tables; ++k) tables.add_curve(std::vector<double>(6));
-  EXPECT_EQ(load(encode(tables, header_of(robot)), robot), Refusal::none);
+  EXPECT_EQ(load(tables), Refusal::none);
   tables.add_curve(std::vector<double>(6));
-  EXPECT_EQ(load(encode(tables, header_of(robot)), robot), Refusal::table_too_large);
+  EXPECT_EQ(load(tables), Refusal::table_too_large);
 
   TermSet<double> values;
   for (std::size_t k = 0; k < 3; ++k) values.add_curve(std::vector<double>(256));
-  EXPECT_EQ(load(encode(values, header_of(robot)), robot), Refusal::none);
+  EXPECT_EQ(load(values), Refusal::none);
   values.add_curve(std::vector<double>(6));
-  EXPECT_EQ(load(encode(values, header_of(robot)), robot), Refusal::table_too_large);
+  EXPECT_EQ(load(values), Refusal::table_too_large);
 }
 
 TEST(Image, TablesAreChecked) {
-  const arms::Robot robot = arms::tx60l();
-  const auto grid = [&](const std::vector<double>& rows, const std::vector<double>& columns, auto change) {
+  using Nodes = std::vector<double>;
+  using T = Table&;
+  const auto grid = [](
+                        const Nodes& rows, const Nodes& columns,
+                        const std::function<void(T)>& change = [](T) {}) {
     TermSet<double> set;
-    set.add_grid(rows, columns, std::vector<double>(rows.size() * columns.size()));
+    set.add_grid(rows, columns, Nodes(rows.size() * columns.size()));
     change(set.tables.back());
-    return load(encode(set, header_of(robot)), robot);
+    return load(set);
   };
-  const auto as_it_is = [](Table&) {};
-  EXPECT_EQ(grid({0, 1}, {0, 1}, as_it_is), Refusal::none);
-  EXPECT_EQ(grid({0}, {0, 1}, as_it_is), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0}, as_it_is), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 0}, {0, 1}, as_it_is), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1, 0.5}, as_it_is), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1}, [](Table& t) { t.rows = 3; }), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1}, [](Table& t) { t.columns = 0xFFFF; }), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1}, [](Table& t) { t.row_joint = 6; }), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1}, [](Table& t) { t.column_joint = 255; }), Refusal::bad_value);
-  EXPECT_EQ(grid({0, 1}, {0, 1}, [](Table& t) { t.row_covariate = static_cast<flexcomp::Covariate>(6); }),
-            Refusal::bad_value);
+  EXPECT_EQ(grid({0, 1}, {0, 1}), Refusal::none);
+  EXPECT_EQ(grid({0}, {0, 1}), Refusal::bad_value);
+  EXPECT_EQ(grid({0, 1}, {0}), Refusal::bad_value);
+  EXPECT_EQ(grid({0, 0}, {0, 1}), Refusal::bad_value);
+  EXPECT_EQ(grid({0, 1}, {0, 1, 0.5}), Refusal::bad_value);
+  const std::function<void(T)> bad[] = {[](T t) { t.rows = 3; }, [](T t) { t.columns = 0xFFFF; },
+                                        [](T t) { t.row_joint = 6; }, [](T t) { t.column_joint = 255; },
+                                        [](T t) { t.row_covariate = static_cast<flexcomp::Covariate>(6); }};
+  for (const auto& change : bad) EXPECT_EQ(grid({0, 1}, {0, 1}, change), Refusal::bad_value);
   for (const std::size_t size : {0U, 1U, 5U, 257U}) {
     TermSet<double> set;
     set.add_curve(std::vector<double>(size));
-    EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::bad_value) << size;
+    EXPECT_EQ(load(set), Refusal::bad_value) << size;
   }
   // A curve that reads a grid, a grid that reads a curve, a table that comes only later.
   TermSet<double> set;
   set.add_curve(std::vector<double>(6));
   set.add_grid({0, 1}, {0, 1}, {0, 0, 0, 0});
   set.add({1, 0}, Basis::curve, 1.0).table = 1;
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::bad_value);
+  EXPECT_EQ(load(set), Refusal::bad_value);
   set.terms[0].basis = Basis::grid;
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::none);
+  EXPECT_EQ(load(set), Refusal::none);
   set.terms[0].table = 0;
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::bad_value);
+  EXPECT_EQ(load(set), Refusal::bad_value);
   set.terms[0].table = 2;
-  EXPECT_EQ(load(encode(set, header_of(robot)), robot), Refusal::bad_value);
+  EXPECT_EQ(load(set), Refusal::bad_value);
 }
 
 TEST(Image, WhatDoesNotFitIsNotWritten) {
-  const arms::Robot robot = arms::tx60l();
   const TermSet<double> set = usual_set();
   const std::size_t size = flexcomp::image_size(set.list());
   Bytes out(size + 8, 0xEE);
-  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(robot), out.data(), size - 1), 0U);
+  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(tx60l), out.data(), size - 1), 0U);
   EXPECT_EQ(std::count(out.begin(), out.end(), 0xEE), static_cast<std::ptrdiff_t>(out.size()));
-  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(robot), out.data(), size), size);
+  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(tx60l), out.data(), size), size);
   for (std::size_t k = size; k < out.size(); ++k) EXPECT_EQ(out[k], 0xEE);
   // A record's length has 16 bits: 8,190 values are the last that it can announce.
   for (const std::size_t values : {8190U, 8191U}) {
     TermSet<double> large;
     large.add_curve(std::vector<double>(values));
     Bytes b(flexcomp::image_size(large.list()));
-    EXPECT_EQ(flexcomp::encode_image(large.list(), header_of(robot), b.data(), b.size()),
+    EXPECT_EQ(flexcomp::encode_image(large.list(), header_of(tx60l), b.data(), b.size()),
               values == 8190U ? b.size() : 0U);
   }
   TermSet<double> many;
   many.terms.resize(65536);
   Bytes b(flexcomp::image_size(many.list()));
-  EXPECT_EQ(flexcomp::encode_image(many.list(), header_of(robot), b.data(), b.size()), 0U);
+  EXPECT_EQ(flexcomp::encode_image(many.list(), header_of(tx60l), b.data(), b.size()), 0U);
 }
 
 TEST(Image, AListWhoseTablesRunOutOfItsValuesIsRefused) {
-  const arms::Robot robot = arms::tx60l();
   TermSet<double> set;
   set.add_curve(std::vector<double>(6));
   set.tables[0].size = 7;
   const auto model = std::make_unique<Model<double>>();
-  EXPECT_EQ(model->prepare(robot, set.list()), Refusal::bad_value);
+  EXPECT_EQ(model->prepare(tx60l, set.list()), Refusal::bad_value);
   Bytes b(flexcomp::image_size(set.list()));
-  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(robot), b.data(), b.size()), 0U);
+  EXPECT_EQ(flexcomp::encode_image(set.list(), header_of(tx60l), b.data(), b.size()), 0U);
   set.tables[0].size = 6;
   set.tables[0].offset = 1;
-  EXPECT_EQ(model->prepare(robot, set.list()), Refusal::bad_value);
+  EXPECT_EQ(model->prepare(tx60l, set.list()), Refusal::bad_value);
   set.tables[0].offset = 0;
-  EXPECT_EQ(model->prepare(robot, set.list()), Refusal::none);
+  EXPECT_EQ(model->prepare(tx60l, set.list()), Refusal::none);
 }
 
 /// Runs whatever was accepted: it may compensate or refuse, but never leave its bounds.
 template <class S>
-void run(const Model<S>& model, const arms::Robot& robot, arms::Random& random) {
-  const auto pose = random.pose(robot);
-  std::array<S, 6> q{};
-  for (std::size_t i = 0; i < 6; ++i) q[i] = static_cast<S>(pose[i]);
-  const auto out = flexcomp::compensate(model, q, flexcomp::default_context<S>(robot));
+void run(const Model<S>& model, arms::Random& random) {
+  const std::array<S, 6> q = arms::as<S>(random.pose(tx60l));
+  const auto out = flexcomp::compensate(model, q, flexcomp::default_context<S>(tx60l));
   for (std::size_t i = 0; i < 6; ++i) {
     ASSERT_TRUE(out.q[i] >= model.lower(i) && out.q[i] <= model.upper(i));
     ASSERT_LE(std::abs(out.q[i] - q[i]), S(0.1) + S(8) * std::numeric_limits<S>::epsilon());
@@ -511,9 +495,8 @@ void run(const Model<S>& model, const arms::Robot& robot, arms::Random& random) 
 
 TEST(Image, AnyBytesWithARightChecksumAreSafe) {
   // An adversary who can make a CRC: random bytes behind a right header, and good images with random damage.
-  const arms::Robot robot = arms::tx60l();
   arms::Random random(85);
-  const Bytes good = encode(usual_set(), header_of(robot));
+  const Bytes good = encode(usual_set());
   const auto model = std::make_unique<Model<double>>();
   const auto single = std::make_unique<Model<float>>();
   int accepted = 0;
@@ -551,11 +534,11 @@ TEST(Image, AnyBytesWithARightChecksumAreSafe) {
         b[80 + random.below(b.size() - 80)] = static_cast<std::uint8_t>(random.bits());
     }
     fix_crc(b);
-    if (load(b, robot, *model) == Refusal::none) {
+    if (load(b, *model) == Refusal::none) {
       ++accepted;
-      run(*model, robot, random);
+      run(*model, random);
     }
-    if (load(b, robot, *single) == Refusal::none) run(*single, robot, random);
+    if (load(b, *single) == Refusal::none) run(*single, random);
     if (::testing::Test::HasFatalFailure()) return;
   }
   std::printf(
@@ -565,21 +548,18 @@ TEST(Image, AnyBytesWithARightChecksumAreSafe) {
 }
 
 TEST(Image, AnyBytesAtAllAreSafe) {
-  const arms::Robot robot = arms::tx60l();
   arms::Random random(86);
   for (int n = 0; n < 20000; ++n) {
     Bytes b(random.below(300));
     for (std::uint8_t& v : b) v = static_cast<std::uint8_t>(random.bits());
-    ASSERT_NE(load(b, robot), Refusal::none);
+    ASSERT_NE(load(b), Refusal::none);
     // visit_image on what nobody has checked.
     if (b.size() >= 8) {
       std::memcpy(b.data(), "FLXC\x01\x00\x60\x00", 8);
       if (b.size() >= 12) flexcomp::store_u32(&b[8], static_cast<std::uint32_t>(b.size()));
     }
-    const std::unique_ptr<std::uint8_t[]> exact(new std::uint8_t[b.size()]);
-    std::copy(b.begin(), b.end(), exact.get());
     Collector<double> back;
-    flexcomp::visit_image<double>(exact.get(), b.size(), back);
+    flexcomp::visit_image<double>(exactly(b).get(), b.size(), back);
   }
 }
 
@@ -644,11 +624,10 @@ TEST(Numbers, FloatToBinary64IsExact) {
 }
 
 TEST(Numbers, AFloatControllerReadsTheNearestOfWhatWasSent) {
-  const arms::Robot robot = arms::tx60l();
   arms::Random random(89);
   TermSet<double> set = usual_set();
   for (Term<double>& t : set.terms) t.coefficient = random.around(1e-3);
-  const Bytes bytes = encode(set, header_of(robot));
+  const Bytes bytes = encode(set);
   Collector<float> back;
   ASSERT_EQ(flexcomp::visit_image<float>(bytes.data(), bytes.size(), back), Refusal::none);
   for (std::size_t k = 0; k < set.terms.size(); ++k) {
@@ -659,7 +638,7 @@ TEST(Numbers, AFloatControllerReadsTheNearestOfWhatWasSent) {
     ASSERT_EQ(back.set.values[k], static_cast<float>(set.values[k]));
   // And what it writes is read by a host of doubles as the same floats.
   Collector<double> again;
-  const Bytes rough = encode(back.set, header_of(robot));
+  const Bytes rough = encode(back.set);
   ASSERT_EQ(flexcomp::visit_image<double>(rough.data(), rough.size(), again), Refusal::none);
   for (std::size_t k = 0; k < set.terms.size(); ++k)
     ASSERT_EQ(again.set.terms[k].coefficient, static_cast<double>(back.set.terms[k].coefficient));
@@ -707,9 +686,8 @@ TEST(Numbers, Sha256VectorsOfFips180) {
 }
 
 TEST(Numbers, NominalHashKnowsTheGeometryAndNothingElse) {
-  const arms::Robot robot = arms::tx60l();
-  const flexcomp::Sha256Digest hash = flexcomp::nominal_hash(robot);
-  arms::Robot other = robot;
+  const flexcomp::Sha256Digest hash = flexcomp::nominal_hash(tx60l);
+  arms::Robot other = tx60l;
   for (flexcomp::JointLimits& l : other.limits) l = arms::limits(-1, 1);
   other.gravity_m_s2 = {9.8, 0, 0};
   other.tool_xyz_m = {1, 2, 3};
@@ -725,17 +703,17 @@ TEST(Numbers, NominalHashKnowsTheGeometryAndNothingElse) {
         &flexcomp::NominalLink::theta_rad, &flexcomp::NominalLink::d_m, &flexcomp::NominalLink::a_m,
         &flexcomp::NominalLink::alpha_rad, &flexcomp::NominalLink::beta_rad};
     for (double flexcomp::NominalLink::*const member : members) {
-      arms::Robot changed = robot;
+      arms::Robot changed = tx60l;
       double& v = changed.links[i].*member;
       v = std::nextafter(v, 10.0);
       EXPECT_NE(flexcomp::nominal_hash(changed), hash) << "link " << i;
-      if (robot.links[i].*member == 0) {
+      if (tx60l.links[i].*member == 0) {
         v = -0.0;
         EXPECT_EQ(flexcomp::nominal_hash(changed), hash) << "negative zero is zero";
       }
     }
   }
-  arms::Robot swapped = robot;
+  arms::Robot swapped = tx60l;
   std::swap(swapped.links[4], swapped.links[0]);
   EXPECT_NE(flexcomp::nominal_hash(swapped), hash);
 }

@@ -4,8 +4,6 @@
 // general path.
 #include <flexcomp/compensate.hpp>
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,17 +15,12 @@
 namespace {
 
 using arms::Joints;
+using arms::part;
 using flexcomp::Basis;
 using flexcomp::Factor;
 using flexcomp::Model;
 namespace detail = flexcomp::detail;
 namespace slot = flexcomp::slot;
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int part = 20;
-#else
-constexpr int part = 1;
-#endif
 
 std::array<flexcomp::SinCos<double>, 6> angles(const Model<double>& model, const Joints& q) {
   std::array<flexcomp::SinCos<double>, 6> a;
@@ -45,10 +38,8 @@ arms::TermSet<double> loaded_terms(const arms::Arm& arm, arms::Random& random) {
     set.add(arms::on_link(i + 1, slot::theta), Basis::load_torque_cubed, random.around(1e-7), i);
     set.add(arms::on_link((i + 2) % 6 + 1, slot::theta), Basis::load_torque, random.around(1e-5), i);
   }
-  std::vector<double> c(24);
-  for (double& v : c) v = random.around(1e-5);
   flexcomp::Term<double>& t = set.add(arms::on_link(3, slot::theta), Basis::curve, 1.0, 2);
-  t.table = set.add_curve(c);
+  t.table = set.add_curve(random.around(1e-5, 24));
   t.factor = Factor::load_torque;
   return set;
 }
@@ -58,8 +49,7 @@ TEST(JointDeflection, LoadsMatchTheForwardModel) {
   double worst = 0, largest = 0;
   for (const arms::Arm& arm : arms::all()) {
     const arms::TermSet<double> set = loaded_terms(arm, random);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(arm.robot, set);
     ASSERT_TRUE(model.has_only_joint_deflections());
     for (int n = 0; n < 20000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
@@ -89,8 +79,7 @@ TEST(JointDeflection, LinearisationMatchesValueAndDifferences) {
   double worst = 0, worst_change = 0;
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(arm.robot, set);
     const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
     detail::StaticLoad<double> load;
     detail::static_load(model, context, load);
@@ -134,20 +123,17 @@ TEST(JointDeflection, ExpandedCurveMatchesTheSpline) {
   arms::Random random(33);
   for (const std::size_t size : {6U, 7U, 18U, 128U, 256U}) {
     arms::TermSet<double> set;
-    std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
+    const std::vector<double> c = random.around(1, size);
     flexcomp::Term<double>& t = set.add(arms::on_link(1, slot::theta), Basis::curve, 1.0, 0);
     t.table = set.add_curve(c);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arms::tx60l(), set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(arms::tx60l(), set);
     double value = 0, slope = 0, bend = 0;
     for (int n = 0; n < 20000 / part; ++n) {
       const double q = n < 100 ? (n - 50) * flexcomp::pi / 25 : random.around(30);
       detail::Expansion<double> at{0, 0, 0};
       detail::expand_curve(model, t, q, 1.0, at);
       const double h = 1e-4 / static_cast<double>(size);
-      const double left = arms::curve_value(c, q - h), here = arms::curve_value(c, q),
-                   right = arms::curve_value(c, q + h);
+      const double left = plain::curve(c, q - h), here = plain::curve(c, q), right = plain::curve(c, q + h);
       value = std::max(value, std::abs(at.value - here));
       const double m = static_cast<double>(size);
       slope = std::max(slope, std::abs(at.slope - (right - left) / (2 * h)) / m);
@@ -164,14 +150,12 @@ TEST(JointDeflection, ConstantTwistMatchesTheChain) {
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1_geometry(arm, 0.01);
     for (std::uint8_t k = 0; k < 6; ++k) set.add(arms::on_tool(k), Basis::one, 1e-5);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(arm.robot, set);
     for (int n = 0; n < 2000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
-      flexcomp::Workspace<double> ws;
       const flexcomp::Pose<double> nominal = flexcomp::nominal_forward(model, q);
       const flexcomp::Pose<double> real =
-          flexcomp::forward(model, q, flexcomp::default_context<double>(arm.robot), ws);
+          arms::forward(model, q, flexcomp::default_context<double>(arm.robot));
       std::array<flexcomp::SinCos<double>, 6> angle;
       for (std::size_t i = 0; i < 6; ++i)
         angle[i] = compose(flexcomp::sin_cos(q[i]), model.nominal(i).offset);
@@ -191,19 +175,13 @@ TEST(JointDeflection, ConstantTwistMatchesTheChain) {
   }
 }
 
-/// True where the smallest singular value of a Jacobian is at least 0.1.
-bool is_regular(const arms::NominalJacobian::Matrix& j) {
-  using Solver = Eigen::SelfAdjointEigenSolver<arms::NominalJacobian::Matrix>;
-  return Solver(j * j.transpose(), Eigen::EigenvaluesOnly).eigenvalues()[0] >= 0.01;
-}
-
 /// Largest remaining position error over regular poses, m.
 double left_by(const arms::Robot& robot, const Model<double>& model, arms::Random& random, bool with_force) {
   const arms::NominalJacobian jacobian(robot);
   double left = 0;
   for (int n = 0; n < 4000 / part;) {
     const Joints q = random.pose(robot);
-    if (!is_regular(jacobian(q))) continue;
+    if (!jacobian.is_regular(q)) continue;
     ++n;
     flexcomp::Context<double, 6> context = flexcomp::default_context<double>(robot);
     for (double& d : context.direction) d = static_cast<double>(random.below(3)) - 1;
@@ -232,8 +210,7 @@ TEST(JointDeflection, JointOnlyPathCompensatesEveryTermOfJoints) {
     }
     set.add(arms::on_tool(slot::rx), Basis::one, 1e-3);
     set.add(arms::on_tool(slot::z), Basis::one, -1e-3);
-    Model<double> model;
-    ASSERT_EQ(model.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto model = arms::prepared(arm.robot, set);
     ASSERT_TRUE(model.has_only_joint_deflections());
     for (const bool with_force : {false, true}) {
       const double left = left_by(arm.robot, model, random, with_force);
@@ -247,12 +224,10 @@ TEST(JointDeflection, GeneralPathMatchesTheJointOnlyPath) {
   arms::Random random(36);
   for (const arms::Arm& arm : arms::all()) {
     arms::TermSet<double> set = arms::table1(arm);
-    Model<double> joints_only;
-    ASSERT_EQ(joints_only.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto joints_only = arms::prepared(arm.robot, set);
     // A term that is always 0 here, but of a kind that takes the general path.
     set.add(arms::on_link(3, slot::a), Basis::direction, 1e-3, 2);
-    Model<double> any;
-    ASSERT_EQ(any.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto any = arms::prepared(arm.robot, set);
     ASSERT_TRUE(joints_only.has_only_joint_deflections());
     ASSERT_FALSE(any.has_only_joint_deflections());
     const flexcomp::Context<double, 6> context = flexcomp::default_context<double>(arm.robot);
@@ -260,7 +235,7 @@ TEST(JointDeflection, GeneralPathMatchesTheJointOnlyPath) {
     double worst = 0;
     for (int n = 0; n < 4000 / part; ++n) {
       const Joints q = random.pose(arm.robot);
-      if (!is_regular(jacobian(q))) continue;
+      if (!jacobian.is_regular(q)) continue;
       const auto a = flexcomp::compensate(joints_only, q, context);
       const auto b = flexcomp::compensate(any, q, context);
       ASSERT_EQ(a.status, b.status);
@@ -272,8 +247,7 @@ TEST(JointDeflection, GeneralPathMatchesTheJointOnlyPath) {
     // Terms of links and frames must be compensated as well.
     set.add(arms::on_link(2, slot::alpha), Basis::load_moment_x, 2e-6, 1);
     set.add(arms::on_link(5, slot::gamma), Basis::sine, 1e-4, 4, 1);
-    Model<double> more;
-    ASSERT_EQ(more.prepare(arm.robot, set.list()), flexcomp::Refusal::none);
+    const auto more = arms::prepared(arm.robot, set);
     const double left = left_by(arm.robot, more, random, true);
     std::printf("[ measured ] %s, links and frames too: %.1e m\n", arm.name, left);
     EXPECT_LE(left, 2e-8) << arm.name;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rigid forward model and its Jacobian against KDL, which shares no code with the core.
 #include <kdl/chain.hpp>
-#include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainjnttojacsolver.hpp>
 
 #include <algorithm>
@@ -10,15 +9,14 @@
 #include <gtest/gtest.h>
 
 #include "support/arms.hpp"
+#include "support/drawn_arm.hpp"
 
 namespace {
 
 using arms::Joints;
 using arms::Robot;
 using flexcomp::Basis;
-using flexcomp::Model;
 
-constexpr int poses = 10000;
 constexpr double bound = 1e-12;  // m and rad
 
 /// Differences from nominal: six links with theta, d, a, alpha, beta, then base and tool x y z rx ry rz.
@@ -68,7 +66,7 @@ KDL::Chain chain_of(const Robot& robot, const Errors& e) {
   return chain;
 }
 
-arms::TermSet<double> terms_of(const Errors& e) {
+arms::TermSet<double> error_terms(const Errors& e) {
   arms::TermSet<double> set;
   for (std::size_t i = 0; i < 6; ++i)
     for (std::uint8_t s = 0; s < 5; ++s) set.add(arms::on_link(i + 1, s), Basis::one, e.link[i][s]);
@@ -79,41 +77,34 @@ arms::TermSet<double> terms_of(const Errors& e) {
   return set;
 }
 
-struct Worst {
+struct FromKdl {
   double position_m = 0;
   double orientation_rad = 0;
   double jacobian = 0;
 };
 
 /// Largest differences over `count` poses of one arm with the errors.
-void compare(const Robot& robot, const Errors& errors, arms::Random& random, int count, Worst& worst) {
+void compare(const Robot& robot, const Errors& errors, arms::Random& random, int count, FromKdl& worst) {
   const KDL::Chain chain = chain_of(robot, errors);
-  KDL::ChainFkSolverPos_recursive fk(chain);
+  drawn::Judge judge(chain);
   KDL::ChainJntToJacSolver jac(chain);
-  Model<double> model;
-  ASSERT_EQ(model.prepare(robot, terms_of(errors).list()), flexcomp::Refusal::none);
+  const auto model = arms::prepared(robot, error_terms(errors));
   const auto context = flexcomp::default_context<double>(robot);
   for (int n = 0; n < count; ++n) {
     const Joints q = random.pose(robot);
     KDL::JntArray joints(6);
     for (unsigned i = 0; i < 6; ++i) joints(i) = q[i];
-    KDL::Frame frame;
-    ASSERT_GE(fk.JntToCart(joints, frame), 0);
     KDL::Jacobian jacobian(6);
     ASSERT_GE(jac.JntToJac(joints, jacobian), 0);
-    Eigen::Matrix3d rotation;
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) rotation(r, c) = frame.M(r, c);
-    const Eigen::Vector3d position(frame.p.x(), frame.p.y(), frame.p.z());
+    const flexcomp::Pose<double> expected = judge(q);
 
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model, q, context, at);
-    flexcomp::Workspace<double> ws;
-    const flexcomp::Pose<double> pose = flexcomp::forward(model, q, context, ws);
+    const auto at = arms::linearised(model, q, context);
+    const flexcomp::Pose<double> pose = arms::forward(model, q, context);
     ASSERT_EQ(pose.position, at.pose.position);
     ASSERT_EQ(pose.rotation, at.pose.rotation);
-    worst.position_m = std::max(worst.position_m, (pose.position - position).norm());
-    worst.orientation_rad = std::max(worst.orientation_rad, arms::angle_between(rotation, pose.rotation));
+    worst.position_m = std::max(worst.position_m, (pose.position - expected.position).norm());
+    worst.orientation_rad =
+        std::max(worst.orientation_rad, arms::angle_between(expected.rotation, pose.rotation));
     for (std::size_t i = 0; i < 6; ++i) {
       const auto screw = flexcomp::screw(model, at, arms::on_link(i + 1, flexcomp::slot::theta));
       worst.jacobian =
@@ -122,7 +113,7 @@ void compare(const Robot& robot, const Errors& errors, arms::Random& random, int
   }
 }
 
-void report(const char* what, const char* arm, const Worst& worst) {
+void report(const char* what, const char* arm, const FromKdl& worst) {
   std::printf("[ measured ] %s, %s: %.1e m, %.1e rad, Jacobian %.1e\n", arm, what, worst.position_m,
               worst.orientation_rad, worst.jacobian);
   EXPECT_LE(worst.position_m, bound) << arm;
@@ -133,8 +124,8 @@ void report(const char* what, const char* arm, const Worst& worst) {
 TEST(Kdl, NominalArm) {
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(1);
-    Worst worst;
-    compare(arm.robot, Errors(), random, poses, worst);
+    FromKdl worst;
+    compare(arm.robot, Errors(), random, 10000, worst);
     report("nominal", arm.name, worst);
   }
 }
@@ -142,21 +133,15 @@ TEST(Kdl, NominalArm) {
 TEST(Kdl, NominalForwardIsTheSameChain) {
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(2);
-    Model<double> model;
-    model.begin(arm.robot);
-    model.finish();
-    const KDL::Chain chain = chain_of(arm.robot, Errors());
-    KDL::ChainFkSolverPos_recursive fk(chain);
+    const auto model = arms::prepared(arm.robot, arms::TermSet<double>());
+    drawn::Judge judge(chain_of(arm.robot, Errors()));
     for (int n = 0; n < 1000; ++n) {
       const Joints q = random.pose(arm.robot);
-      KDL::JntArray joints(6);
-      for (unsigned i = 0; i < 6; ++i) joints(i) = q[i];
-      KDL::Frame frame;
-      ASSERT_GE(fk.JntToCart(joints, frame), 0);
-      const auto pose = flexcomp::nominal_forward(model, q);
+      const flexcomp::Pose<double> expected = judge(q);
+      const flexcomp::Pose<double> pose = flexcomp::nominal_forward(model, q);
       for (int r = 0; r < 3; ++r) {
-        ASSERT_NEAR(pose.position[r], frame.p(r), bound);
-        for (int c = 0; c < 3; ++c) ASSERT_NEAR(pose.rotation(r, c), frame.M(r, c), bound);
+        ASSERT_NEAR(pose.position[r], expected.position[r], bound);
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(pose.rotation(r, c), expected.rotation(r, c), bound);
       }
     }
   }
@@ -165,9 +150,9 @@ TEST(Kdl, NominalForwardIsTheSameChain) {
 TEST(Kdl, RandomGeometricBaseAndToolErrors) {
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(3);
-    Worst worst;
+    FromKdl worst;
     // Other errors every 50 poses: 200 arms of each kind.
-    for (int n = 0; n < poses / 50; ++n) compare(arm.robot, random_errors(random), random, 50, worst);
+    for (int n = 0; n < 10000 / 50; ++n) compare(arm.robot, random_errors(random), random, 50, worst);
     report("20 mm and 2 deg of error in all 42 slots", arm.name, worst);
   }
 }
@@ -175,7 +160,7 @@ TEST(Kdl, RandomGeometricBaseAndToolErrors) {
 TEST(Kdl, NominalBetaAndTheta) {
   // No arm here has a nominal beta, so one is made: a drawing may.
   arms::Random random(4);
-  Worst worst;
+  FromKdl worst;
   for (int n = 0; n < 100; ++n) {
     Robot robot = arms::rx160l();
     for (flexcomp::NominalLink& l : robot.links) {

@@ -92,11 +92,7 @@ void everything_the_core_does() {
     const auto model = std::make_unique<Model<S>>();
     const auto received = std::make_unique<Model<S>>();
     std::vector<std::array<S, 6>> commands;
-    for (int n = 0; n < 100; ++n) {
-      const arms::Joints q = random.pose(arm.robot);
-      commands.emplace_back();
-      for (std::size_t i = 0; i < 6; ++i) commands.back()[i] = static_cast<S>(q[i]);
-    }
+    for (int n = 0; n < 100; ++n) commands.push_back(arms::as<S>(random.pose(arm.robot)));
     commands[7][2] = std::numeric_limits<S>::quiet_NaN();
     commands[8][4] = S(0);
 

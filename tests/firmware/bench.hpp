@@ -10,6 +10,7 @@
 #include <cstring>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "flexcomp/image.hpp"
@@ -60,6 +61,17 @@ inline std::vector<Term<Scalar>> some_terms(double size, std::uint32_t seed) {
   return terms;
 }
 
+/// The image of a list for a robot.
+inline Bytes image_of(const Robot& robot, std::uint32_t sequence, const TermList<Scalar>& list) {
+  ImageHeader header;
+  header.sequence = sequence;
+  header.nominal_hash = nominal_hash(robot);
+  header.name_hash = robot.name_hash;
+  Bytes out(image_size(list));
+  encode_image(list, header, out.data(), out.size());
+  return out;
+}
+
 /// The image of such a set.
 inline Bytes make_image(const Robot& robot, std::uint32_t sequence, double size = 1, std::uint32_t seed = 1) {
   const std::vector<Term<Scalar>> terms = some_terms(size, seed);
@@ -67,14 +79,7 @@ inline Bytes make_image(const Robot& robot, std::uint32_t sequence, double size 
   for (unsigned k = 0; k < 16; ++k) values.push_back(static_cast<Scalar>(1e-4 * size * std::sin(k + seed)));
   Table table;
   table.size = 16;
-  ImageHeader header;
-  header.sequence = sequence;
-  header.nominal_hash = nominal_hash(robot);
-  header.name_hash = robot.name_hash;
-  const TermList<Scalar> list{terms.data(), terms.size(), &table, 1, values.data(), values.size()};
-  Bytes out(image_size(list));
-  encode_image(list, header, out.data(), out.size());
-  return out;
+  return image_of(robot, sequence, {terms.data(), terms.size(), &table, 1, values.data(), values.size()});
 }
 
 /// Writes the CRC anew after bytes were changed.
@@ -145,14 +150,28 @@ class Flash {
 
 inline Scalar real(double v) { return static_cast<Scalar>(v); }
 
+/// An ordinary pose, rad.
+inline Joints some_joints() { return {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)}; }
+
+inline DeviceSettings fading_in(std::uint32_t cycles) {
+  DeviceSettings settings;
+  settings.control.fade_cycles = cycles;
+  return settings;
+}
+
 /// An arm on a flash, with the control cycle at hand.
 class Arm {
+  std::unique_ptr<Flash> own_;
+
  public:
-  explicit Arm(Flash& flash, DeviceSettings settings = {}, Robot r = tx60l())
-      : robot(r), device(std::make_unique<Device>(r, flash.hooks(), settings)) {
+  explicit Arm(Flash& memory, DeviceSettings settings = {}, Robot r = tx60l())
+      : flash(memory), robot(r), device(std::make_unique<Device>(r, memory.hooks(), settings)) {
     device->store().boot();
     step();
   }
+  /// On a flash of its own.
+  explicit Arm(DeviceSettings settings = {}, Robot r = tx60l())
+      : Arm(std::make_unique<Flash>(), settings, r) {}
 
   StepResult step(const Joints& q = {}) { return device->step(q, default_context<Scalar>(robot)); }
 
@@ -198,9 +217,15 @@ class Arm {
 
   std::uint32_t sequence() const { return device->store().active_sequence(); }
 
+  Flash& flash;
   Robot robot;
   std::unique_ptr<Device> device;
   std::uint32_t now_ms = 0;
+
+ private:
+  Arm(std::unique_ptr<Flash> own, DeviceSettings settings, Robot r) : Arm(*own, settings, r) {
+    own_ = std::move(own);
+  }
 };
 
 /// What the core makes of a command with the set of this image.

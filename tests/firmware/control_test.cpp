@@ -36,8 +36,7 @@ wire::ProbeRequest request(const Joints& q, const FirmwareContext& c) {
 }
 
 TEST(Probe, EqualsTheCoreToTheLastBit) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes image = make_image(arm.robot, 3);
   ASSERT_EQ(arm.push(image), Answer::accepted);
   std::mt19937 random(1);
@@ -56,8 +55,7 @@ TEST(Probe, EqualsTheCoreToTheLastBit) {
 }
 
 TEST(Probe, SaysWhatItCannotDo) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Joints q{};
   FirmwareContext c = default_context<Scalar>(arm.robot);
   EXPECT_EQ(arm.device->probe(request(q, c)).status, static_cast<std::uint16_t>(StepStatus::no_set));
@@ -74,10 +72,7 @@ TEST(Probe, SaysWhatItCannotDo) {
 }
 
 TEST(Step, EqualsTheCoreOnceFadedIn) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 10;
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(fading_in(10));
   const Bytes image = make_image(arm.robot, 1);
   ASSERT_EQ(arm.push(image), Answer::accepted);
   std::mt19937 random(2);
@@ -97,10 +92,7 @@ TEST(Step, EqualsTheCoreOnceFadedIn) {
 // difference that the fade allows.
 TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
   constexpr std::uint32_t fade = 50;
-  DeviceSettings settings;
-  settings.control.fade_cycles = fade;
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(fading_in(fade));
   std::mt19937 random(4);
   Joints q{};
   std::vector<Bytes> images;
@@ -143,14 +135,12 @@ TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
 }
 
 TEST(Step, TheFirstSetIsFadedInFromZero) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 100;
   Flash flash;
   { Arm(flash).push(make_image(tx60l(), 1)); }
-  Device device(tx60l(), flash.hooks(), settings);
+  Device device(tx60l(), flash.hooks(), fading_in(100));
   device.store().boot();
   const FirmwareContext c = default_context<Scalar>(tx60l());
-  const Joints q = {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)};
+  const Joints q = some_joints();
   EXPECT_EQ(device.step(q, c).q, q);
   for (int k = 0; k < 100; ++k) device.step(q, c);
   EXPECT_NE(device.step(q, c).q, q);
@@ -159,14 +149,12 @@ TEST(Step, TheFirstSetIsFadedInFromZero) {
 class OnRefusalTest : public testing::TestWithParam<OnRefusal> {};
 
 TEST_P(OnRefusalTest, CommandsThatCannotBeCorrected) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 20;
+  DeviceSettings settings = fading_in(20);
   settings.control.on_refusal = GetParam();
   const bool hold = GetParam() == OnRefusal::hold_last_correction;
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(settings);
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
-  const Joints q = {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)};
+  const Joints q = some_joints();
   for (int k = 0; k < 5; ++k) arm.step(q);
   const StepResult good = arm.step(q);
   ASSERT_EQ(good.status, StepStatus::ok);
@@ -214,10 +202,7 @@ INSTANTIATE_TEST_SUITE_P(Both, OnRefusalTest,
                          testing::Values(OnRefusal::pass_through, OnRefusal::hold_last_correction));
 
 TEST(Step, FadesStayWithinTheLimits) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 200;
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(fading_in(200));
   std::mt19937 random(6);
   for (std::uint32_t n = 1; n <= 10; ++n) {
     ASSERT_EQ(arm.stage(make_image(arm.robot, n, 4, n)), Answer::accepted);
@@ -238,13 +223,11 @@ TEST(Step, FadesStayWithinTheLimits) {
 // A constant correction must not move a joint over a limit that its command respects, and where the command comes
 // back the output moves no farther than the command does.
 TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 200;
+  DeviceSettings settings = fading_in(200);
   settings.control.on_refusal = OnRefusal::hold_last_correction;
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(settings);
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
-  const Joints q = {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)};
+  const Joints q = some_joints();
   Joints good{};
   for (int k = 0; k < 300; ++k) good = arm.step(q).q;
   Joints end = q;
@@ -268,11 +251,9 @@ TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
 
 // Also while a set fades in and the arm moves on meanwhile.
 TEST(Step, NoJointIsEverCorrectedByMoreThanTheLargestCorrection) {
-  DeviceSettings settings;
-  settings.control.fade_cycles = 100;
+  DeviceSettings settings = fading_in(100);
   settings.control.compensation.largest_correction_rad = real(1e-4);
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(settings);
   std::mt19937 random(9);
   for (std::uint32_t n = 1; n <= 10; ++n) {
     ASSERT_EQ(arm.stage(make_image(arm.robot, n, 4, n)), Answer::accepted);
@@ -289,8 +270,7 @@ TEST(Step, NoJointIsEverCorrectedByMoreThanTheLargestCorrection) {
 TEST(Step, TracksTheDirectionThroughADeadBand) {
   DeviceSettings settings;
   settings.control.direction_band_rad = real(1e-3);
-  Flash flash;
-  Arm arm(flash, settings);
+  Arm arm(settings);
   const auto go = [&arm](double q1) {
     Joints q{};
     q[1] = real(q1);
@@ -309,8 +289,7 @@ TEST(Step, TracksTheDirectionThroughADeadBand) {
 }
 
 TEST(Step, SurvivesAnyBits) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
   std::mt19937_64 random(8);
   for (int k = 0; k < 100000; ++k) {

@@ -87,8 +87,7 @@ Bytes exception(unsigned function, unsigned code) {
 
 class ModbusPdu : public testing::Test {
  protected:
-  Flash flash;
-  Arm arm{flash};
+  Arm arm;
   Client client{*arm.device, 1};
 };
 
@@ -239,8 +238,7 @@ TEST(ModbusCrc, CheckValue) {
 
 class ModbusFraming : public testing::Test {
  protected:
-  Flash flash;
-  Arm arm{flash};
+  Arm arm;
   ModbusServer server{*arm.device, 1};
   Wire wire_out;
 };
@@ -368,7 +366,7 @@ TEST_F(ModbusFraming, SurvivesMillionsOfBytes) {
     arm.step();
   }
   EXPECT_GT(bytes, 5000000U);
-  EXPECT_FALSE(flash.double_writes);
+  EXPECT_FALSE(arm.flash.double_writes);
 }
 
 }  // namespace

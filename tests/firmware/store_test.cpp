@@ -15,8 +15,7 @@ using wire::StoreState;
 StoreState state(const Arm& arm) { return static_cast<StoreState>(arm.device->status().state); }
 
 TEST(Store, TakesASetInAndGivesItBackByteForByte) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   EXPECT_EQ(arm.device->status().faults, wire::fault::no_valid_set);
   const Bytes image = make_image(arm.robot, 1);
   EXPECT_EQ(arm.push(image), Answer::accepted);
@@ -24,15 +23,14 @@ TEST(Store, TakesASetInAndGivesItBackByteForByte) {
   EXPECT_EQ(arm.pull(), image);
   EXPECT_EQ(arm.device->status().faults, 0);
   EXPECT_EQ(arm.device->status().settled, 1);
-  EXPECT_FALSE(flash.double_writes);
-  Arm after(flash);
+  EXPECT_FALSE(arm.flash.double_writes);
+  Arm after(arm.flash);
   EXPECT_EQ(after.sequence(), 1U);
   EXPECT_EQ(after.pull(), image);
 }
 
 TEST(Store, AlternatesBetweenTheSlotsAndRollsBackOnce) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   for (std::uint32_t n = 1; n <= 5; ++n)
     ASSERT_EQ(arm.push(make_image(arm.robot, n, 1, n)), Answer::accepted);
   EXPECT_EQ(arm.device->status().previous_sequence, 4U);
@@ -41,14 +39,13 @@ TEST(Store, AlternatesBetweenTheSlotsAndRollsBackOnce) {
   EXPECT_EQ(arm.sequence(), 4U);
   EXPECT_EQ(arm.pull(), make_image(arm.robot, 4, 1, 4));
   EXPECT_EQ(arm.run(Command::rollback), Answer::no_previous);
-  Arm after(flash);  // the set that was left behind does not come back
+  Arm after(arm.flash);  // the set that was left behind does not come back
   EXPECT_EQ(after.sequence(), 4U);
   EXPECT_EQ(after.push(make_image(arm.robot, 5)), Answer::accepted);
 }
 
 TEST(Store, RefusesASequenceThatIsNotAboveTheActiveOne) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   EXPECT_EQ(arm.offer(make_image(arm.robot, 0)), Refusal::stale_sequence);
   ASSERT_EQ(arm.push(make_image(arm.robot, 7)), Answer::accepted);
   EXPECT_EQ(arm.offer(make_image(arm.robot, 7)), Refusal::stale_sequence);
@@ -58,8 +55,7 @@ TEST(Store, RefusesASequenceThatIsNotAboveTheActiveOne) {
 }
 
 TEST(Store, RefusesEveryFlippedBit) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes good = make_image(arm.robot, 1);
   for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
     Bytes bad = good;
@@ -67,12 +63,11 @@ TEST(Store, RefusesEveryFlippedBit) {
     ASSERT_NE(arm.offer(bad), Refusal::none) << "bit " << bit;
     ASSERT_EQ(state(arm), StoreState::idle);
   }
-  EXPECT_EQ(flash.erased_slots, 0U);
+  EXPECT_EQ(arm.flash.erased_slots, 0U);
 }
 
 TEST(Store, RefusesEveryTruncation) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes good = make_image(arm.robot, 1);
   for (std::size_t size = 1; size < good.size(); ++size) {
     const Bytes cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
@@ -87,8 +82,7 @@ TEST(Store, RefusesEveryTruncation) {
 }
 
 TEST(Store, NamesWhatIsWrong) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes good = make_image(arm.robot, 1);
   const auto changed = [&good](std::size_t at, std::uint8_t value) {
     Bytes b = good;
@@ -106,22 +100,20 @@ TEST(Store, NamesWhatIsWrong) {
   longer.insert(longer.end(), 4, 0);
   EXPECT_EQ(arm.offer(longer), Refusal::bad_length);
 
-  const std::size_t first_term =
-      good.size() - 4 - 26 * 0;  // found below: the last record is a term of 32 bytes
-  const std::size_t term = first_term - 32;
+  const std::size_t term = good.size() - 4 - 32;  // the last record before the CRC is a term of 32 bytes
   EXPECT_EQ(arm.offer(changed(term, 99)), Refusal::unknown_record);
   EXPECT_EQ(arm.offer(changed(term + 6, 200)), Refusal::unknown_basis);
   EXPECT_EQ(arm.device->status().detail, 200U);
   EXPECT_EQ(arm.offer(changed(term + 4, 9)), Refusal::bad_place);
   EXPECT_EQ(arm.offer(changed(term + 7, 6)), Refusal::bad_value);
-  Bytes nan = good;
-  store_u64(nan.data() + term + 24, 0x7FF8000000000000ULL);
-  reseal(nan);
-  EXPECT_EQ(arm.offer(nan), Refusal::bad_value);
-  Bytes huge = good;
-  store_u64(huge.data() + term + 24, 0x7FEFFFFFFFFFFFFFULL);
-  reseal(huge);
-  EXPECT_NE(arm.offer(huge), Refusal::none);
+  const auto with_coefficient = [&](std::uint64_t bits) {
+    Bytes b = good;
+    store_u64(b.data() + term + 24, bits);
+    reseal(b);
+    return arm.offer(b);
+  };
+  EXPECT_EQ(with_coefficient(0x7FF8000000000000ULL), Refusal::bad_value) << "not a number";
+  EXPECT_NE(with_coefficient(0x7FEFFFFFFFFFFFFFULL), Refusal::none) << "the largest number";
 
   Robot other = arm.robot;
   other.links[1].a_m += 1e-12;
@@ -141,24 +133,15 @@ TEST(Store, NamesWhatIsWrong) {
 TEST(Store, RefusesHalfATurn) {
   Robot robot = tx60l();
   robot.tool_xyz_m = {0, 0, 0};
-  Flash flash;
-  Arm arm(flash, {}, robot);
+  Arm arm({}, robot);
   Term<Scalar> t;
   t.place = {body::tool, slot::rz};
   t.coefficient = real(pi);
-  ImageHeader header;
-  header.sequence = 1;
-  header.nominal_hash = nominal_hash(robot);
-  header.name_hash = robot.name_hash;
-  const TermList<Scalar> list{&t, 1, nullptr, 0, nullptr, 0};
-  Bytes image(image_size(list));
-  ASSERT_NE(encode_image(list, header, image.data(), image.size()), 0U);
-  EXPECT_EQ(arm.offer(image), Refusal::implausible);
+  EXPECT_EQ(arm.offer(image_of(robot, 1, {&t, 1, nullptr, 0, nullptr, 0})), Refusal::implausible);
 }
 
 TEST(Store, HasRoomForWhatItPromises) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   std::vector<Term<Scalar>> terms(FirmwareCapacity::terms);
   for (auto& t : terms) {
     t.place = {1, slot::theta};
@@ -166,27 +149,19 @@ TEST(Store, HasRoomForWhatItPromises) {
     t.argument = 1;
     t.coefficient = real(1e-6);
   }
-  ImageHeader header;
-  header.sequence = 1;
-  header.nominal_hash = nominal_hash(arm.robot);
-  header.name_hash = arm.robot.name_hash;
-  const auto encode = [&] {
-    const TermList<Scalar> list{terms.data(), terms.size(), nullptr, 0, nullptr, 0};
-    Bytes image(image_size(list));
-    encode_image(list, header, image.data(), image.size());
-    return image;
+  const auto offered = [&] {
+    return arm.offer(image_of(arm.robot, 1, {terms.data(), terms.size(), nullptr, 0, nullptr, 0}));
   };
-  EXPECT_EQ(arm.offer(encode()), Refusal::none);
+  EXPECT_EQ(offered(), Refusal::none);
   terms.push_back(terms.back());
-  EXPECT_EQ(arm.offer(encode()), Refusal::too_many_terms);
+  EXPECT_EQ(offered(), Refusal::too_many_terms);
 }
 
 TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes first = make_image(arm.robot, 1);
   ASSERT_EQ(arm.push(first), Answer::accepted);
-  const auto before = flash.slots;
+  const auto before = arm.flash.slots;
   const Bytes second = make_image(arm.robot, 2, 1, 2);
   Store& store = arm.device->store();
 
@@ -209,13 +184,12 @@ TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
   EXPECT_EQ(state(arm), StoreState::idle);
   EXPECT_EQ(arm.run(Command::commit), Answer::wrong_state);
 
-  EXPECT_EQ(flash.slots, before);
+  EXPECT_EQ(arm.flash.slots, before);
   EXPECT_EQ(arm.pull(), first);
 }
 
 TEST(Store, OneClientAtATime) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes image = make_image(arm.robot, 1);
   ASSERT_EQ(arm.stage(image, 1), Answer::accepted);
   EXPECT_EQ(arm.stage(image, 2), Answer::busy);
@@ -233,8 +207,7 @@ TEST(Store, OneClientAtATime) {
 }
 
 TEST(Store, BytesMayComeTwiceButLeaveNoGap) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes image = make_image(arm.robot, 1);
   const auto size = static_cast<std::uint32_t>(image.size());
   Store& store = arm.device->store();
@@ -273,8 +246,7 @@ TEST(Store, NothingIsTakenInWhileTheCycleStandsStill) {
 }
 
 TEST(Store, ATrialRevertsByItself) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes first = make_image(arm.robot, 1);
   ASSERT_EQ(arm.push(first), Answer::accepted);
   arm.stage(make_image(arm.robot, 2, 1, 2));
@@ -300,23 +272,21 @@ TEST(Store, ATrialRevertsByItself) {
 }
 
 TEST(Store, AConfirmedTrialStays) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes image = make_image(arm.robot, 2, 1, 2);
   ASSERT_EQ(arm.push(image, Command::commit_trial, 1000), Answer::accepted);
   EXPECT_EQ(state(arm), StoreState::trial);
   EXPECT_EQ(arm.pull(), image);
-  { EXPECT_EQ(Arm(flash).sequence(), 0U) << "not before it is confirmed"; }
+  { EXPECT_EQ(Arm(arm.flash).sequence(), 0U) << "not before it is confirmed"; }
   EXPECT_EQ(arm.run(Command::confirm), Answer::accepted);
   EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::accepted);
   for (int k = 0; k < 2000; ++k) arm.step();
   EXPECT_EQ(arm.settle().active_sequence, 2U);
-  EXPECT_EQ(Arm(flash).pull(), image);
+  EXPECT_EQ(Arm(arm.flash).pull(), image);
 }
 
 TEST(Store, AConfirmationThatComesTooLateSaysSo) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   arm.stage(make_image(arm.robot, 1));
   arm.run(Command::commit_trial, 10);
   while (state(arm) == StoreState::working) arm.device->store().poll(++arm.now_ms);
@@ -337,8 +307,7 @@ TEST(Store, AConfirmationThatComesTooLateSaysSo) {
 }
 
 TEST(Store, RollbackOutOfATrial) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
   ASSERT_EQ(arm.push(make_image(arm.robot, 2, 1, 2), Command::commit_trial, 100000), Answer::accepted);
   EXPECT_EQ(arm.run(Command::rollback), Answer::accepted);
@@ -347,8 +316,7 @@ TEST(Store, RollbackOutOfATrial) {
 }
 
 TEST(Store, RestoreDefaultsForgetsBothSlots) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   for (std::uint32_t n = 1; n <= 2; ++n) ASSERT_EQ(arm.push(make_image(arm.robot, n)), Answer::accepted);
   EXPECT_EQ(arm.run(Command::restore_defaults), Answer::accepted);
   const wire::Status s = arm.settle();
@@ -356,16 +324,15 @@ TEST(Store, RestoreDefaultsForgetsBothSlots) {
   EXPECT_EQ(s.active_slot, wire::no_slot);
   EXPECT_TRUE(arm.pull().empty());
   EXPECT_EQ(arm.step().status, StepStatus::no_set);
-  EXPECT_EQ(Arm(flash).sequence(), 0U);
+  EXPECT_EQ(Arm(arm.flash).sequence(), 0U);
   EXPECT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
 }
 
 TEST(Store, FailingMemoryChangesNothingThatRuns) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes first = make_image(arm.robot, 1);
   ASSERT_EQ(arm.push(first), Answer::accepted);
-  flash.fails = true;
+  arm.flash.fails = true;
   EXPECT_EQ(arm.push(make_image(arm.robot, 2)), Answer::storage_failed);
   EXPECT_EQ(arm.device->status().faults, wire::fault::storage);
   EXPECT_EQ(arm.pull(), first);
@@ -535,8 +502,7 @@ TEST(Store, SurvivesAPowerCutAtEveryByte) {
 TEST(Store, SurvivesAnything) {
   std::mt19937 engine(3);
   const auto random = [&engine] { return static_cast<std::uint32_t>(engine()); };
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   const Bytes garbage = [&random] {
     Bytes b(staging_bytes);
     for (auto& x : b) x = static_cast<std::uint8_t>(random());
@@ -573,7 +539,7 @@ TEST(Store, SurvivesAnything) {
       default:
         arm.device->store().disconnect(origin);
     }
-    ASSERT_FALSE(flash.double_writes);
+    ASSERT_FALSE(arm.flash.double_writes);
   }
   arm.run(Command::rollback);
   arm.settle();

@@ -22,6 +22,11 @@ std::uint32_t& at(std::size_t offset) { return registers.at(offset / 4); }
 class ZynqmpCan : public ::testing::Test {
  protected:
   ZynqmpCan() { registers = {}; }
+
+  /// What is received.
+  std::uint16_t id = 0;
+  std::uint8_t size = 0;
+  std::array<std::uint8_t, 8> bytes{};
 };
 
 TEST_F(ZynqmpCan, IsThatOfTheHardwareByDefault) { EXPECT_EQ(FLEXCOMP_ZYNQMP_IN_QEMU, 0); }
@@ -63,9 +68,6 @@ TEST_F(ZynqmpCan, ReceivesAFrame) {
   at(0x54) = 0x80001234U;  // 8 bytes; the lower half is a time stamp
   at(0x58) = 0x40181001U;
   at(0x5C) = 0x00000002U;
-  std::uint16_t id = 0;
-  std::uint8_t size = 0;
-  std::array<std::uint8_t, 8> bytes{};
   ASSERT_EQ(zynqmp_can_receive(&id, bytes.data(), &size), 1);
   EXPECT_EQ(id, 0x601);
   EXPECT_EQ(size, 8);
@@ -74,9 +76,8 @@ TEST_F(ZynqmpCan, ReceivesAFrame) {
 }
 
 TEST_F(ZynqmpCan, LeavesAnEmptyFifoAlone) {
-  std::uint16_t id = 7;
-  std::uint8_t size = 7;
-  std::array<std::uint8_t, 8> bytes{};
+  id = 7;
+  size = 7;
   EXPECT_EQ(zynqmp_can_receive(&id, bytes.data(), &size), 0);
   EXPECT_EQ(id, 7);
   EXPECT_EQ(size, 7);
@@ -85,9 +86,6 @@ TEST_F(ZynqmpCan, LeavesAnEmptyFifoAlone) {
 }
 
 TEST_F(ZynqmpCan, TakesNeitherRemoteNorExtendedFramesNorTooLongOnes) {
-  std::uint16_t id = 0;
-  std::uint8_t size = 0;
-  std::array<std::uint8_t, 8> bytes{};
   at(0x1C) = 1U << 7U;
   for (const std::uint32_t flag : {1U << 20U, 1U << 19U}) {
     at(0x50) = 0xC0200000U | flag;
@@ -100,9 +98,6 @@ TEST_F(ZynqmpCan, TakesNeitherRemoteNorExtendedFramesNorTooLongOnes) {
 }
 
 TEST_F(ZynqmpCan, CountsOverflows) {
-  std::uint16_t id = 0;
-  std::uint8_t size = 0;
-  std::array<std::uint8_t, 8> bytes{};
   zynqmp_can_init(0x000, 0x601);
   at(0x1C) = 1U << 6U;
   zynqmp_can_receive(&id, bytes.data(), &size);
@@ -116,7 +111,6 @@ TEST_F(ZynqmpCan, CountsOverflows) {
 TEST_F(ZynqmpCan, InQemuTheWordsAreThoseOfSocketCan) {
   const std::uint8_t four[4] = {0x11, 0x22, 0x33, 0x44};
   std::uint8_t back[4] = {};
-  std::uint16_t id = 0;
   EXPECT_EQ(zynqmp_can_id_word(0x601, 1), 0x601U);
   EXPECT_EQ(zynqmp_can_data_word(four, 1), 0x44332211U);
   zynqmp_can_data(0x44332211U, 1, back);

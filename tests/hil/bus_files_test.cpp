@@ -75,8 +75,7 @@ class Node {
   }
 
  private:
-  Flash flash_;
-  Arm arm_{flash_};
+  Arm arm_;
   CanopenSettings settings_;
   CanTransmit transmit_;
   std::array<std::uint8_t, 8> answer_{};
@@ -170,8 +169,7 @@ TEST(ElectronicDataSheet, HasWhatTheNodeHasAndNothingElse) {
 }
 
 TEST(RegisterMap, HasWhatTheServerHasAndNothingElse) {
-  Flash flash;
-  Arm arm(flash);
+  Arm arm;
   ModbusServer server(*arm.device, 3);
   std::array<std::uint8_t, wire::modbus::pdu_bytes> out{};
   const auto exception = [&](std::vector<std::uint8_t> request) {

@@ -10,17 +10,30 @@
 #include <cstddef>
 #include <cstdint>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 #include <flexcomp/forward.hpp>
 #include <flexcomp/identification.hpp>
 #include <flexcomp/robot.hpp>
 #include <flexcomp/term.hpp>
 
+#include "support/plain_arm.hpp"
+
 namespace arms {
 
 constexpr double deg = 3.14159265358979323846 / 180;  // rad
 constexpr double mm = 1e-3;                           // m
+
+/// Numbers of poses are divided by this: a sanitizer looks at every access, not at every pose.
+#if defined(__SANITIZE_ADDRESS__)
+constexpr int part = 20;
+#else
+constexpr int part = 1;
+#endif
 
 using Robot = flexcomp::NominalRobot<6>;
 using Joints = std::array<double, 6>;
@@ -101,6 +114,11 @@ class Random {
   }
   double around(double size) { return uniform(-size, size); }
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
+  std::vector<double> around(double size, std::size_t count) {
+    std::vector<double> v(count);
+    for (double& x : v) x = around(size);
+    return v;
+  }
 
   /// Each within +-size.
   Joints joints(double size) {
@@ -173,6 +191,30 @@ struct TermSet {
   }
 };
 
+/// The same commands for another scalar.
+template <class To, class From>
+inline std::array<To, 6> as(const std::array<From, 6>& from) {
+  std::array<To, 6> q;
+  for (std::size_t i = 0; i < 6; ++i) q[i] = static_cast<To>(from[i]);
+  return q;
+}
+
+/// The same context for another scalar.
+template <class To>
+inline flexcomp::Context<To> as(const flexcomp::Context<double>& from) {
+  flexcomp::Context<To> c;
+  c.payload_kg = static_cast<To>(from.payload_kg);
+  c.temperature_c = static_cast<To>(from.temperature_c);
+  c.time_s = static_cast<To>(from.time_s);
+  for (std::size_t k = 0; k < 3; ++k) {
+    c.payload_com_m[k] = static_cast<To>(from.payload_com_m[k]);
+    c.force_n[k] = static_cast<To>(from.force_n[k]);
+  }
+  c.direction = as<To>(from.direction);
+  c.relative_speed = as<To>(from.relative_speed);
+  return c;
+}
+
 /// The same list for another scalar.
 template <class To>
 inline TermSet<To> as(const TermSet<double>& from) {
@@ -204,25 +246,31 @@ inline flexcomp::Place on_tool(std::uint8_t slot) { return {flexcomp::body::tool
 inline flexcomp::Place on_load(std::uint8_t slot) { return {flexcomp::body::load, slot}; }
 inline flexcomp::Place on_point(std::uint8_t slot) { return {flexcomp::body::point, slot}; }
 
+/// Table 1 of the paper by joint, its stiffness read as N·mm/rad; base as x y z rx ry rz, m and rad.
+namespace of_table1 {
+constexpr double theta[6] = {-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};   // deg
+constexpr double d[6] = {-0.4, 0, 0.2, -0.1, 0.1, -0.3};              // mm
+constexpr double a[6] = {0.09, -0.05, -0.1, 0.06, -0.08, 0.03};       // mm
+constexpr double alpha[6] = {0.03, 0.02, -0.05, -0.008, 0.01, 0.07};  // deg
+constexpr double base[6] = {0.3 * mm, -0.2 * mm, 0.1 * mm, 0.02 * deg, 0.01 * deg, 0.01 * deg};
+constexpr double stiffness[6] = {1.47e10, 6.67e7, 3.13e7, 2.22e7, 1.18e6, 7.69e5};  // N·mm/rad
+}  // namespace of_table1
+
 /// The rigid half of Table 1 times `scale`. A link whose axis is parallel to the next one takes beta for d.
 inline TermSet<double> table1_geometry(const Arm& arm, double scale = 1) {
   using flexcomp::Basis;
   namespace slot = flexcomp::slot;
   TermSet<double> set;
-  const double theta[6] = {-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};   // deg
-  const double d[6] = {-0.4, 0, 0.2, -0.1, 0.1, -0.3};              // mm
-  const double a[6] = {0.09, -0.05, -0.1, 0.06, -0.08, 0.03};       // mm
-  const double alpha[6] = {0.03, 0.02, -0.05, -0.008, 0.01, 0.07};  // deg
-  const double base[6] = {0.3 * mm, -0.2 * mm, 0.1 * mm, 0.02 * deg, 0.01 * deg, 0.01 * deg};
+  namespace t1 = of_table1;
   for (std::size_t i = 0; i < 6; ++i) {
     const bool parallel = i == 1 || (i == 2 && arm.parallel_3);
-    set.add(on_link(i + 1, slot::theta), Basis::one, scale * theta[i] * deg);
-    if (!parallel) set.add(on_link(i + 1, slot::d), Basis::one, scale * d[i] * mm);
-    set.add(on_link(i + 1, slot::a), Basis::one, scale * a[i] * mm);
-    set.add(on_link(i + 1, slot::alpha), Basis::one, scale * alpha[i] * deg);
+    set.add(on_link(i + 1, slot::theta), Basis::one, scale * t1::theta[i] * deg);
+    if (!parallel) set.add(on_link(i + 1, slot::d), Basis::one, scale * t1::d[i] * mm);
+    set.add(on_link(i + 1, slot::a), Basis::one, scale * t1::a[i] * mm);
+    set.add(on_link(i + 1, slot::alpha), Basis::one, scale * t1::alpha[i] * deg);
     if (parallel) set.add(on_link(i + 1, slot::beta), Basis::one, scale * 0.03 * deg);
   }
-  for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::one, scale * base[k]);
+  for (std::uint8_t k = 0; k < 6; ++k) set.add(on_base(k), Basis::one, scale * t1::base[k]);
   return set;
 }
 
@@ -232,10 +280,9 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
   using flexcomp::Effect;
   namespace slot = flexcomp::slot;
   TermSet<double> set = table1_geometry(arm, scale);
-  const double stiffness[6] = {1.47e10, 6.67e7, 3.13e7, 2.22e7, 1.18e6, 7.69e5};  // N·mm/rad
   for (std::size_t i = 0; i < 6; ++i) {
     flexcomp::Term<double>& t =
-        set.add(on_link(i + 1, slot::theta), Basis::load_torque, scale * 1e3 / stiffness[i], i);
+        set.add(on_link(i + 1, slot::theta), Basis::load_torque, scale * 1e3 / of_table1::stiffness[i], i);
     t.effect = Effect::joint_compliance;
     t.instance = static_cast<std::uint16_t>(i);
   }
@@ -245,35 +292,13 @@ inline TermSet<double> table1(const Arm& arm, double scale = 1) {
   return set;
 }
 
-/// The cardinal cubic B-spline centred at 0 (de Boor), written apart from the core.
-inline double cardinal_spline(double x) {
-  x = std::abs(x);
-  if (x < 1) return 2.0 / 3 - x * x + x * x * x / 2;
-  return x < 2 ? (2 - x) * (2 - x) * (2 - x) / 6 : 0;
-}
-
-/// The curve of a set of coefficients at reading q (rad), as docs/model.md, M6 defines it.
-inline double curve_value(const std::vector<double>& coefficients, double q) {
-  const double m = static_cast<double>(coefficients.size());
-  const double pi = 3.14159265358979323846;
-  double sum = 0;
-  for (std::size_t k = 0; k < coefficients.size(); ++k) {
-    // The nearest of the images of knot k, one turn apart.
-    double x = m * q / (2 * pi) - static_cast<double>(k);
-    x -= m * std::round(x / m);
-    sum += coefficients[k] * cardinal_spline(x);
-  }
-  return sum;
-}
-
 /// Adds a random curve of `size` coefficients on every joint, each reaching exactly +-amplitude_rad.
 inline void add_joint_curves(TermSet<double>& set, Random& random, double amplitude_rad,
                              std::size_t size = 18) {
   for (std::size_t i = 0; i < 6; ++i) {
-    std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
+    std::vector<double> c = random.around(1, size);
     double largest = 0;
-    for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(curve_value(c, k * 0.5 * deg)));
+    for (int k = 0; k < 720; ++k) largest = std::max(largest, std::abs(plain::curve(c, k * 0.5 * deg)));
     for (double& v : c) v *= amplitude_rad / largest;
     const std::uint16_t table = set.add_curve(c);
     flexcomp::Term<double>& t =
@@ -297,23 +322,52 @@ inline flexcomp::Context<double, 6> random_context(const Robot& robot, Random& r
   return c;
 }
 
+/// The model of a set that has to be accepted.
+template <class S, class Model = flexcomp::Model<S>>
+inline Model prepared(const Robot& robot, const TermSet<S>& set) {
+  Model model;
+  const flexcomp::Refusal refusal = model.prepare(robot, set.list());
+  if (refusal != flexcomp::Refusal::none)
+    throw std::logic_error("set refused: " + std::to_string(static_cast<int>(refusal)));
+  return model;
+}
+
+template <class Model>
+inline flexcomp::Linearisation<double> linearised(const Model& model, const Joints& q,
+                                                  const flexcomp::Context<double>& context) {
+  flexcomp::Linearisation<double> at;
+  flexcomp::linearise(model, q, context, at);
+  return at;
+}
+
+template <class Model>
+inline flexcomp::Pose<double> forward(const Model& model, const Joints& q,
+                                      const flexcomp::Context<double>& context) {
+  flexcomp::Workspace<double> ws;
+  return flexcomp::forward(model, q, context, ws);
+}
+
 /// The nominal Jacobian at the origin of Ftool, in F0: rows m, then rad. (kdl_test judges these screws.)
 class NominalJacobian {
  public:
   using Matrix = Eigen::Matrix<double, 6, 6>;
 
-  explicit NominalJacobian(const Robot& robot) : context_(flexcomp::default_context<double>(robot)) {
-    model_.begin(robot);
-    model_.finish();
-  }
+  explicit NominalJacobian(const Robot& robot)
+      : model_(prepared(robot, TermSet<double>())), context_(flexcomp::default_context<double>(robot)) {}
 
   Matrix operator()(const Joints& q) const {
-    flexcomp::Linearisation<double> at;
-    flexcomp::linearise(model_, q, context_, at);
+    const flexcomp::Linearisation<double> at = linearised(model_, q, context_);
     Matrix j;
     for (std::size_t i = 0; i < 6; ++i)
       j.col(static_cast<int>(i)) = flexcomp::screw(model_, at, on_link(i + 1, flexcomp::slot::theta));
     return j;
+  }
+
+  /// Whether the smallest singular value (m, rad) is at least 0.1.
+  bool is_regular(const Joints& q) const {
+    const Matrix j = (*this)(q);
+    return Eigen::SelfAdjointEigenSolver<Matrix>(j * j.transpose(), Eigen::EigenvaluesOnly)
+               .eigenvalues()[0] >= 0.01;
   }
 
  private:

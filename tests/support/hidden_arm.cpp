@@ -13,7 +13,6 @@
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "identification/residuals.hpp"
-#include "support/arms.hpp"
 
 namespace hidden {
 
@@ -48,6 +47,13 @@ class Random : public arms::Random {
   void shuffle(std::vector<T>& v) {
     for (std::size_t k = v.size(); k > 1; --k) std::swap(v[k - 1], v[below(k)]);
   }
+  /// The numbers from 0 in random order.
+  std::vector<std::size_t> order(std::size_t count) {
+    std::vector<std::size_t> v(count);
+    std::iota(v.begin(), v.end(), std::size_t{0});
+    shuffle(v);
+    return v;
+  }
 };
 
 /// SplitMix64: neighbouring seeds shall have nothing in common.
@@ -56,19 +62,6 @@ std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
   x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
   return x ^ (x >> 31U);
-}
-
-plain::Nominal nominal_of(const arms::Robot& robot) {
-  plain::Nominal n;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const auto& l = robot.links[i];
-    n.links[i] = {l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad};
-  }
-  n.gravity = {robot.gravity_m_s2[0], robot.gravity_m_s2[1], robot.gravity_m_s2[2]};
-  n.tool_xyz = {robot.tool_xyz_m[0], robot.tool_xyz_m[1], robot.tool_xyz_m[2]};
-  n.tool_wxyz = robot.tool_wxyz;
-  n.reference_temperature_c = robot.reference_temperature_c;
-  return n;
 }
 
 struct ArmData {
@@ -96,7 +89,7 @@ void set_arm(Case& c) {
   column.to_m = {0, 0, data.foot_z_m < 0 ? 0 : arm.robot.links[0].d_m};
   column.radius_m = data.column_radius_m;
   c.robot.capsules = {column};
-  c.nominal = nominal_of(c.robot.nominal);
+  c.nominal = plain::nominal_of(c.robot.nominal);
 }
 
 /// Joints and contexts of a session in the order in which it ran.
@@ -106,22 +99,13 @@ struct Session {
   std::vector<std::array<double, 6>> move;
 };
 
+/// Of time and temperature.
 double correlation(const std::vector<plain::Situation>& rows) {
-  double t = 0;
-  double c = 0;
-  for (const auto& s : rows) {
-    t += s.time_s / static_cast<double>(rows.size());
-    c += s.temperature_c / static_cast<double>(rows.size());
-  }
-  double tt = 0;
-  double cc = 0;
-  double tc = 0;
-  for (const auto& s : rows) {
-    tt += (s.time_s - t) * (s.time_s - t);
-    cc += (s.temperature_c - c) * (s.temperature_c - c);
-    tc += (s.time_s - t) * (s.temperature_c - c);
-  }
-  return tc / std::sqrt(tt * cc);
+  Eigen::MatrixX2d columns(rows.size(), 2);
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    columns.row(static_cast<Eigen::Index>(k)) << rows[k].time_s, rows[k].temperature_c;
+  columns.rowwise() -= columns.colwise().mean().eval();
+  return columns.col(0).dot(columns.col(1)) / (columns.col(0).norm() * columns.col(1).norm());
 }
 
 Session draw_session(const Case& c, Random& random) {
@@ -165,21 +149,18 @@ Session draw_session(const Case& c, Random& random) {
 
 /// Errors like those of Table 1, each scaled at random and of random sign.
 void draw_rigid_arm(Case& c, Random& random) {
-  const std::array<double, 6> theta{-0.08, -0.04, 0.05, 0.03, 0.06, -0.1};   // deg
-  const std::array<double, 6> d{-0.4, 0, 0.2, -0.1, 0.1, -0.3};              // mm
-  const std::array<double, 6> a{0.09, -0.05, -0.1, 0.06, -0.08, 0.03};       // mm
-  const std::array<double, 6> alpha{0.03, 0.02, -0.05, -0.008, 0.01, 0.07};  // deg
+  namespace t1 = arms::of_table1;
   const auto scaled = [&](double size) { return size * random.signed_size(0.5, 1.5); };
   for (std::size_t i = 0; i < 6; ++i) {
     const bool parallel = i == 1 || (i == 2 && arms::all()[c.arm].parallel_3);
     plain::Link& l = c.truth.geometric[i];
-    l.theta = scaled(theta[i]) * arms::deg;
-    l.a = scaled(a[i]) * arms::mm;
-    l.alpha = scaled(alpha[i]) * arms::deg;
+    l.theta = scaled(t1::theta[i]) * arms::deg;
+    l.a = scaled(t1::a[i]) * arms::mm;
+    l.alpha = scaled(t1::alpha[i]) * arms::deg;
     if (parallel) {
       l.beta = scaled(0.03) * arms::deg;
     } else {
-      l.d = scaled(d[i]) * arms::mm;
+      l.d = scaled(t1::d[i]) * arms::mm;
     }
   }
   c.truth.base = {scaled(0.3) * arms::mm,   scaled(0.2) * arms::mm,   scaled(0.1) * arms::mm,
@@ -187,10 +168,9 @@ void draw_rigid_arm(Case& c, Random& random) {
 }
 
 void draw_flexible_arm(Case& c, Random& random) {
-  const std::array<double, 6> stiffness{1.47e7, 6.67e4, 3.13e4, 2.22e4, 1.18e3, 7.69e2};  // N·m/rad
   for (int j = 0; j < 6; ++j) {
     c.truth.joint_compliance.push_back({j + 1, arm_data[c.arm].softness * random.uniform(0.5, 1.5) /
-                                                   stiffness[static_cast<std::size_t>(j)]});
+                                                   (arms::of_table1::stiffness[j] * 1e-3)});
   }
   c.truth.link_gravity.push_back({0.0015 * random.uniform(0.5, 1.5), 0.00123 * random.uniform(0.5, 1.5),
                                   0.00054 * random.uniform(0.5, 1.5)});
@@ -255,9 +235,10 @@ constexpr std::array<Kind, 14> kinds{
     Kind::link_bending,         Kind::thermal_growth, Kind::base_drift,     Kind::base_compliance,
     Kind::payload_error,        Kind::reflector_slip};
 
-/// Largest motion of the tool's point by one effect, and the largest value of each of two moments that drive it.
+/// What one effect does at most.
 struct Reach {
-  double moved_m = 0;
+  double moved_m = 0;  ///< the tool's point
+  double tilt_rad = 0;
 };
 
 void hide(plain::Truth& truth, const Effect& effect);
@@ -267,24 +248,12 @@ Reach reach_of(const Case& c, const Session& session, const Effect& effect) {
   hide(with, effect);
   Reach r;
   for (std::size_t k = 0; k < session.q.size(); ++k) {
-    const plain::Matrix before = plain::forward(c.nominal, c.truth, session.q[k], session.situation[k]).pose;
-    const plain::Matrix after = plain::forward(c.nominal, with, session.q[k], session.situation[k]).pose;
-    r.moved_m = std::max(r.moved_m, (plain::origin(after) - plain::origin(before)).norm());
+    const plain::Matrix change = plain::forward(c.nominal, with, session.q[k], session.situation[k]).pose -
+                                 plain::forward(c.nominal, c.truth, session.q[k], session.situation[k]).pose;
+    r.moved_m = std::max(r.moved_m, plain::origin(change).norm());
+    r.tilt_rad = std::max(r.tilt_rad, change.topLeftCorner<3, 3>().norm() / std::sqrt(2.0));
   }
   return r;
-}
-
-/// Largest tilt of the orientation by one effect, rad.
-double tilt_of(const Case& c, const Session& session, const Effect& effect) {
-  plain::Truth with = c.truth;
-  hide(with, effect);
-  double largest = 0;
-  for (std::size_t k = 0; k < session.q.size(); ++k) {
-    const plain::Matrix before = plain::forward(c.nominal, c.truth, session.q[k], session.situation[k]).pose;
-    const plain::Matrix after = plain::forward(c.nominal, with, session.q[k], session.situation[k]).pose;
-    largest = std::max(largest, (after - before).topLeftCorner<3, 3>().norm() / std::sqrt(2.0));
-  }
-  return largest;
 }
 
 bool has_length(const Case& c, unsigned link) {
@@ -362,8 +331,8 @@ std::vector<Effect> draw_effect(const Case& c, const Session& session, Random& r
       // A millionth first: the size follows from what it does, and a tilt beyond a milliradian is no link's.
       for (double& v : e.values) v *= 1e-6;
       const double wanted = random.uniform(0.1e-3, 0.4e-3);
-      const double scale =
-          std::min(wanted / reach_of(c, session, e).moved_m, 1e-3 / std::max(tilt_of(c, session, e), 1e-12));
+      const Reach reach = reach_of(c, session, e);
+      const double scale = std::min(wanted / reach.moved_m, 1e-3 / std::max(reach.tilt_rad, 1e-12));
       for (double& v : e.values) v *= scale;
       return {e};
     }
@@ -382,9 +351,9 @@ std::vector<Effect> draw_effect(const Case& c, const Session& session, Random& r
     case Kind::base_compliance: {
       id.pivot_z_m = arm_data[c.arm].foot_z_m;
       Effect e{id, {1e-6, 0}};
-      const double rx = 1e-6 / tilt_of(c, session, e);
+      const double rx = 1e-6 / reach_of(c, session, e).tilt_rad;
       e.values = {0, 1e-6};
-      const double ry = 1e-6 / tilt_of(c, session, e);
+      const double ry = 1e-6 / reach_of(c, session, e).tilt_rad;
       e.values = {rx * random.uniform(50e-6, 300e-6), ry * random.uniform(50e-6, 300e-6)};
       return {e};
     }
@@ -425,47 +394,33 @@ void hide(plain::Truth& truth, const Effect& effect) {
   const int joint = static_cast<int>(id.joint);
   switch (id.effect) {
     case Kind::nonlinear_compliance:
-      truth.nonlinear_compliance.push_back({joint, v.at(0)});
-      break;
+      return truth.nonlinear_compliance.push_back({joint, v.at(0)});
     case Kind::gear_harmonic:
-      truth.gear_harmonic.push_back({joint, id.order, v.at(0), v.at(1)});
-      break;
+      return truth.gear_harmonic.push_back({joint, id.order, v.at(0), v.at(1)});
     case Kind::joint_curve:
-      truth.joint_curve.push_back({joint, v});
-      break;
+      return truth.joint_curve.push_back({joint, v});
     case Kind::backlash:
-      truth.backlash.push_back({joint, v.at(0)});
-      break;
+      return truth.backlash.push_back({joint, v.at(0)});
     case Kind::readout_lag:
-      truth.readout_lag.push_back({joint, v.at(0)});
-      break;
+      return truth.readout_lag.push_back({joint, v.at(0)});
     case Kind::encoder_scale:
-      truth.encoder_scale.push_back({joint, v.at(0)});
-      break;
+      return truth.encoder_scale.push_back({joint, v.at(0)});
     case Kind::joint_coupling:
-      truth.joint_coupling.push_back({joint, static_cast<int>(id.from), v.at(0)});
-      break;
+      return truth.joint_coupling.push_back({joint, static_cast<int>(id.from), v.at(0)});
     case Kind::axis_wobble:
-      truth.axis_wobble.push_back({joint, id.order, v.at(0), v.at(1), v.at(2), v.at(3)});
-      break;
+      return truth.axis_wobble.push_back({joint, id.order, v.at(0), v.at(1), v.at(2), v.at(3)});
     case Kind::link_bending:
-      truth.link_bending.push_back({static_cast<int>(id.link), v.at(0), v.size() > 1 ? v[1] : 0});
-      break;
+      return truth.link_bending.push_back({static_cast<int>(id.link), v.at(0), v.size() > 1 ? v[1] : 0});
     case Kind::thermal_growth:
-      truth.thermal_growth.push_back({static_cast<int>(id.link), v.at(0)});
-      break;
+      return truth.thermal_growth.push_back({static_cast<int>(id.link), v.at(0)});
     case Kind::base_drift:
-      truth.base_drift.push_back({{v.at(0), v.at(1), v.at(2), v.at(3), v.at(4), v.at(5)}});
-      break;
+      return truth.base_drift.push_back({{v.at(0), v.at(1), v.at(2), v.at(3), v.at(4), v.at(5)}});
     case Kind::base_compliance:
-      truth.base_compliance.push_back({id.pivot_z_m, v.at(0), v.at(1)});
-      break;
+      return truth.base_compliance.push_back({id.pivot_z_m, v.at(0), v.at(1)});
     case Kind::payload_error:
-      truth.payload_error.push_back({v.at(0), {v.at(1), v.at(2), v.at(3)}});
-      break;
+      return truth.payload_error.push_back({v.at(0), {v.at(1), v.at(2), v.at(3)}});
     case Kind::reflector_slip:
-      truth.reflector_slip.push_back({id.after_s, {v.at(0), v.at(1), v.at(2)}});
-      break;
+      return truth.reflector_slip.push_back({id.after_s, {v.at(0), v.at(1), v.at(2)}});
     default:
       throw std::logic_error("an effect that is not drawn");
   }
@@ -477,6 +432,12 @@ double value_of(Covariate kind, unsigned joint, const plain::Joints& q, const pl
   if (kind == Covariate::payload) return s.payload_kg;
   if (kind == Covariate::temperature) return s.temperature_c;
   return q[joint - 1];
+}
+
+/// Of an effect of amplitude 1.
+double shape_at(const Outside& o, const plain::Joints& q, const plain::Situation& s) {
+  return o.shape(value_of(o.covariate[0], o.covariate_joint[0], q, s),
+                 value_of(o.covariate[1], o.covariate_joint[1], q, s));
 }
 
 Outside draw_outside(const Case& c, const Session& session, Random& random) {
@@ -559,9 +520,7 @@ Outside draw_outside(const Case& c, const Session& session, Random& random) {
   }
   double square = 0;
   for (std::size_t k = 0; k < session.q.size(); ++k) {
-    const double f =
-        out.shape(value_of(out.covariate[0], out.covariate_joint[0], session.q[k], session.situation[k]),
-                  value_of(out.covariate[1], out.covariate_joint[1], session.q[k], session.situation[k]));
+    const double f = shape_at(out, session.q[k], session.situation[k]);
     square += f * f / static_cast<double>(session.q.size());
   }
   out.amplitude_rad = random.signed_size(20, 80) * arcsec / std::sqrt(square);
@@ -598,9 +557,7 @@ Observation measured(const Case& c, const Session& session, std::size_t k, std::
 void spoil(Case& c, Random& random) {
   c.wild.assign(c.train.size(), false);
   if (c.roughness != Roughness::outliers) return;
-  std::vector<std::size_t> order(c.train.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  random.shuffle(order);
+  const std::vector<std::size_t> order = random.order(c.train.size());
   const auto count = static_cast<std::size_t>(std::lround(0.03 * static_cast<double>(c.train.size())));
   for (std::size_t k = 0; k < count; ++k) {
     Observation& row = c.train[order[k]];
@@ -629,6 +586,9 @@ std::string words(const Case& c) {
 
 constexpr std::array<const char*, 8> row_names{"one", "none",  "local",    "outside",
                                                "two", "third", "geometry", "rough"};
+constexpr std::array<const char*, 7> roughness_names{"nothing",         "3 % outliers", "a slip besides",
+                                                     "a drift besides", "no time_s",    "no temp_c",
+                                                     "no move columns"};
 
 }  // namespace
 
@@ -647,25 +607,7 @@ std::optional<Row> row_of(const std::string& wanted) {
   return {};
 }
 
-std::string name(Roughness roughness) {
-  switch (roughness) {
-    case Roughness::nothing:
-      return "nothing";
-    case Roughness::outliers:
-      return "3 % outliers";
-    case Roughness::slip:
-      return "a slip besides";
-    case Roughness::drift:
-      return "a drift besides";
-    case Roughness::no_time:
-      return "no time_s";
-    case Roughness::no_temperature:
-      return "no temp_c";
-    case Roughness::no_moves:
-      return "no move columns";
-  }
-  return {};
-}
+std::string name(Roughness roughness) { return roughness_names.at(static_cast<std::size_t>(roughness)); }
 
 bool needs_what_is_missing(Kind effect, Roughness roughness) {
   switch (roughness) {
@@ -765,9 +707,7 @@ Case draw(Row row, std::uint64_t seed) {
   }
   for (const Effect& e : c.hidden) hide(c.truth, e);
 
-  std::vector<std::size_t> order(session.q.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  random.shuffle(order);
+  std::vector<std::size_t> order = random.order(session.q.size());
   std::sort(order.begin(), order.begin() + training_poses);
   std::sort(order.begin() + training_poses, order.end());
   if (c.bump) {
@@ -779,11 +719,10 @@ Case draw(Row row, std::uint64_t seed) {
         });
   }
   if (c.outside) {
-    c.truth.hook.emplace_back([o = *c.outside](const plain::Joints& q, const plain::Situation& s,
-                                               std::array<plain::Moved, 6>& e) {
-      e[o.joint - 1].theta += o.amplitude_rad * o.shape(value_of(o.covariate[0], o.covariate_joint[0], q, s),
-                                                        value_of(o.covariate[1], o.covariate_joint[1], q, s));
-    });
+    c.truth.hook.emplace_back(
+        [o = *c.outside](const plain::Joints& q, const plain::Situation& s, std::array<plain::Moved, 6>& e) {
+          e[o.joint - 1].theta += o.amplitude_rad * shape_at(o, q, s);
+        });
   }
   for (std::size_t n = 0; n < order.size(); ++n) {
     const bool train = n < training_poses;
@@ -800,18 +739,6 @@ Case draw(Row row, std::uint64_t seed) {
 plain::Matrix true_pose(const Case& c, const plain::Joints& q, const plain::Situation& s) {
   const plain::Result r = plain::forward(c.nominal, c.truth, q, s);
   return r.pose * plain::trans(r.measured_point.x(), r.measured_point.y(), r.measured_point.z());
-}
-
-plain::Situation situation_of(const flexcomp::Context<double, 6>& context) {
-  plain::Situation s;
-  s.payload_kg = context.payload_kg;
-  s.payload_com = {context.payload_com_m[0], context.payload_com_m[1], context.payload_com_m[2]};
-  s.force_n = {context.force_n[0], context.force_n[1], context.force_n[2]};
-  s.temperature_c = context.temperature_c;
-  s.time_s = context.time_s;
-  s.direction = context.direction;
-  s.relative_speed = context.relative_speed;
-  return s;
 }
 
 namespace {
@@ -904,9 +831,7 @@ flexcomp::host::TermSet terms_of(const Case& c) {
     constant(arms::on_link(i + 1, slot::alpha), l.alpha);
     constant(arms::on_link(i + 1, slot::beta), l.beta);
   }
-  const plain::Small& b = c.truth.base;
-  const std::array<double, 6> base{b.x, b.y, b.z, b.rx, b.ry, b.rz};
-  for (std::uint8_t k = 0; k < 6; ++k) constant(arms::on_base(k), base[k]);
+  for (std::uint8_t k = 0; k < 6; ++k) constant(arms::on_base(k), plain::six(c.truth.base)[k]);
   for (const plain::JointCompliance& x : c.truth.joint_compliance) {
     EffectId id;
     id.effect = Kind::joint_compliance;

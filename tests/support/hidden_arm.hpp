@@ -17,9 +17,11 @@
 #include "measurement/observation.hpp"
 #include "model/effects.hpp"
 #include "model/robot.hpp"
-#include "support/plain_arm.hpp"
+#include "support/plain_case.hpp"
 
 namespace hidden {
+
+using plain::situation_of;
 
 /// What is hidden. The names are those of the rows of the table of rates.
 enum class Row {
@@ -100,7 +102,6 @@ Case draw(Row row, std::uint64_t seed);
 
 /// The pose that the true arm shows, without noise: measured point and orientation in Fb.
 plain::Matrix true_pose(const Case& c, const plain::Joints& q, const plain::Situation& s);
-plain::Situation situation_of(const flexcomp::Context<double, 6>& context);
 
 /// Truth as the program's own terms: for what stands outside the catalogue, a curve or a grid that comes near it.
 flexcomp::host::TermSet terms_of(const Case& c);

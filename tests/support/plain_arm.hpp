@@ -28,29 +28,17 @@ inline Matrix trans(double x, double y, double z) {
   return m;
 }
 
-inline Matrix rot_x(double a) {
+/// Turns axis `from` (0 … 2) towards axis `to`.
+inline Matrix turned(int from, int to, double a) {
   Matrix m = Matrix::Identity();
-  m(1, 1) = m(2, 2) = std::cos(a);
-  m(1, 2) = -std::sin(a);
-  m(2, 1) = std::sin(a);
+  m(from, from) = m(to, to) = std::cos(a);
+  m(from, to) = -std::sin(a);
+  m(to, from) = std::sin(a);
   return m;
 }
-
-inline Matrix rot_y(double a) {
-  Matrix m = Matrix::Identity();
-  m(0, 0) = m(2, 2) = std::cos(a);
-  m(0, 2) = std::sin(a);
-  m(2, 0) = -std::sin(a);
-  return m;
-}
-
-inline Matrix rot_z(double a) {
-  Matrix m = Matrix::Identity();
-  m(0, 0) = m(1, 1) = std::cos(a);
-  m(0, 1) = -std::sin(a);
-  m(1, 0) = std::sin(a);
-  return m;
-}
+inline Matrix rot_x(double a) { return turned(1, 2, a); }
+inline Matrix rot_y(double a) { return turned(2, 0, a); }
+inline Matrix rot_z(double a) { return turned(0, 1, a); }
 
 struct Link {
   double theta = 0, d = 0, a = 0, alpha = 0, beta = 0;
@@ -183,21 +171,22 @@ struct Truth {
   std::vector<Hook> hook;
 };
 
-/// δ(q) = Σ c_k B(M q / 2π − k), B the cardinal cubic B-spline centred at 0, q folded to a turn: summed over the
-/// images of each knot on three turns.
+/// The cardinal cubic B-spline centred at 0 (de Boor).
+inline double cardinal_spline(double x) {
+  x = std::abs(x);
+  if (x < 1) return (4 - 6 * x * x + 3 * x * x * x) / 6;
+  return x < 2 ? std::pow(2 - x, 3) / 6 : 0;
+}
+
+/// δ(q) = Σ c_k B(M q / 2π − k), B the cardinal spline, q folded to a turn: summed over the images of each knot on three
+/// turns.
 inline double curve(const std::vector<double>& c, double q) {
   const double m = static_cast<double>(c.size());
   const double folded = q - 2 * pi * std::floor(q / (2 * pi));
   double sum = 0;
   for (std::size_t k = 0; k < c.size(); ++k) {
-    for (int turn = -1; turn <= 1; ++turn) {
-      const double x = std::abs(m * folded / (2 * pi) - static_cast<double>(k) + m * turn);
-      if (x < 1) {
-        sum += c[k] * (4 - 6 * x * x + 3 * x * x * x) / 6;
-      } else if (x < 2) {
-        sum += c[k] * std::pow(2 - x, 3) / 6;
-      }
-    }
+    for (int turn = -1; turn <= 1; ++turn)
+      sum += c[k] * cardinal_spline(m * folded / (2 * pi) - static_cast<double>(k) + m * turn);
   }
   return sum;
 }

@@ -72,17 +72,11 @@ inline double usual_value(const flexcomp::Term<double>& t) {
 
 /// Tables of order 1: three curves (6, 17 and 64 values) and three grids that read every covariate.
 inline void add_usual_tables(TermSet<double>& set, Random& random) {
-  for (const std::size_t size : {6U, 17U, 64U}) {
-    std::vector<double> c(size);
-    for (double& v : c) v = random.around(1);
-    set.add_curve(c);
-  }
+  for (const std::size_t size : {6U, 17U, 64U}) set.add_curve(random.around(1, size));
   const auto grid = [&](const std::vector<double>& rows, const std::vector<double>& columns,
                         flexcomp::Covariate row, std::uint8_t row_joint, flexcomp::Covariate column,
                         std::uint8_t column_joint) {
-    std::vector<double> v(rows.size() * columns.size());
-    for (double& x : v) x = random.around(1);
-    set.add_grid(rows, columns, v);
+    set.add_grid(rows, columns, random.around(1, rows.size() * columns.size()));
     set.tables.back().row_covariate = row;
     set.tables.back().row_joint = row_joint;
     set.tables.back().column_covariate = column;

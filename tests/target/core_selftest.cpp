@@ -42,6 +42,13 @@ bool fail(const char* what, std::size_t command, std::size_t number, std::uint64
   return b;
 }
 
+/// A double result of the host, as a target with float would hold it.
+[[maybe_unused]] float in_single(std::uint64_t bits_of_double) {
+  return flexcomp::from_binary64<float>(flexcomp::double_of(bits_of_double));
+}
+
+[[maybe_unused]] float size_of(float v) { return v < 0 ? -v : v; }
+
 bool images_agree() {
   const std::uint8_t* bytes = golden::image.data();
   const std::size_t without_crc = golden::image.size() - flexcomp::image::crc_bytes;
@@ -71,8 +78,8 @@ bool results_agree() {
       const std::uint64_t expected = in_float ? golden::in_float[k][i] : golden::in_double[k][i];
       if (bits(got) != expected) return fail("bits", k, i, expected, bits(got));
       if constexpr (in_float) {
-        const float exact = flexcomp::from_binary64<float>(flexcomp::double_of(golden::in_double[k][i]));
-        const float off = got < exact ? exact - got : got - exact;
+        const float exact = in_single(golden::in_double[k][i]);
+        const float off = size_of(got - exact);
         const bool joint = i >= 12;
         if (joint && static_cast<flexcomp::StepStatus>(status) != flexcomp::StepStatus::ok) continue;
         if (!(off <= (joint ? joint_tolerance : pose_tolerance)))
@@ -89,19 +96,14 @@ bool results_agree() {
             in_float ? golden::columns_in_float[c][e][i] : golden::columns_in_double[c][e][i];
         if (bits(got) != expected) return fail("column of H", c, 6 * e + i, expected, bits(got));
         if constexpr (in_float) {
-          const float exact =
-              flexcomp::from_binary64<float>(flexcomp::double_of(golden::columns_in_double[c][e][i]));
-          const float size = exact < 0 ? -exact : exact;
+          const float size = size_of(in_single(golden::columns_in_double[c][e][i]));
           if (size > largest) largest = size;
         }
       }
       for (std::size_t i = 0; i < 6 && in_float; ++i) {
-        const float got = flexcomp::from_binary64<float>(
-            flexcomp::double_of(flexcomp::to_binary64_bits(results.columns[c][e][i])));
-        const float exact =
-            flexcomp::from_binary64<float>(flexcomp::double_of(golden::columns_in_double[c][e][i]));
-        const float off = got < exact ? exact - got : got - exact;
-        if (!(off <= column_tolerance * largest))
+        const float got = in_single(flexcomp::to_binary64_bits(results.columns[c][e][i]));
+        const float exact = in_single(golden::columns_in_double[c][e][i]);
+        if (!(size_of(got - exact) <= column_tolerance * largest))
           return fail("tolerance of a column of H", c, 6 * e + i, bits(exact), bits(got));
       }
     }

@@ -3,44 +3,40 @@
 #include <cinttypes>
 #include <cstdio>
 #include <cstring>
+#include <type_traits>
 
 #include "target/selftest.hpp"
 
 namespace {
 
-template <class S, class Bits>
+/// The bits of numbers as a row of an array.
+template <class Row>
+void print_row(const Row& row) {
+  std::printf("    {");
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    std::conditional_t<sizeof row[i] == 8, std::uint64_t, std::uint32_t> bits;
+    std::memcpy(&bits, &row[i], sizeof bits);
+    std::printf("%s0x%0*" PRIx64, i == 0 ? "" : ", ", static_cast<int>(2 * sizeof bits),
+                static_cast<std::uint64_t>(bits));
+  }
+  std::printf("},\n");
+}
+
+template <class S>
 void print(const selftest::Results<S>& results, const char* type, const char* name) {
   std::printf("constexpr %s %s[%zu][%zu] = {\n", type, name, selftest::command_count,
               selftest::numbers_per_command);
-  for (const auto& row : results.numbers) {
-    std::printf("    {");
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      Bits bits;
-      std::memcpy(&bits, &row[i], sizeof bits);
-      std::printf("%s0x%0*" PRIx64, i == 0 ? "" : ", ", static_cast<int>(2 * sizeof bits),
-                  static_cast<std::uint64_t>(bits));
-    }
-    std::printf("},\n");
-  }
+  for (const auto& row : results.numbers) print_row(row);
   std::printf("};\n");
 }
 
-template <class S, class Bits>
+template <class S>
 void print_columns(const selftest::Results<S>& results, const char* type, const char* name) {
   std::printf("constexpr %s %s[%zu][%zu][6] = {\n", type, name, selftest::column_command_count,
               selftest::entry_count);
   for (const auto& columns : results.columns) {
     std::printf("  {\n");
-    for (const auto& column : columns) {
-      std::printf("    {");
-      for (std::size_t i = 0; i < column.size(); ++i) {
-        Bits bits;
-        std::memcpy(&bits, &column[i], sizeof bits);
-        std::printf("%s0x%0*" PRIx64, i == 0 ? "" : ", ", static_cast<int>(2 * sizeof bits),
-                    static_cast<std::uint64_t>(bits));
-      }
-      std::printf("},\n");
-    }
+    for (const auto& column : columns) print_row(column);
     std::printf("  },\n");
   }
   std::printf("};\n");
@@ -81,12 +77,12 @@ int main() {
                               : ", ",
                 static_cast<unsigned>(image[k]));
   std::printf("}};\n\n");
-  print<double, std::uint64_t>(in_double, "std::uint64_t", "in_double");
+  print(in_double, "std::uint64_t", "in_double");
   print_status(in_double, "status_in_double");
-  print_columns<double, std::uint64_t>(in_double, "std::uint64_t", "columns_in_double");
-  print<float, std::uint32_t>(in_float, "std::uint32_t", "in_float");
+  print_columns(in_double, "std::uint64_t", "columns_in_double");
+  print(in_float, "std::uint32_t", "in_float");
   print_status(in_float, "status_in_float");
-  print_columns<float, std::uint32_t>(in_float, "std::uint32_t", "columns_in_float");
+  print_columns(in_float, "std::uint32_t", "columns_in_float");
   std::printf("\n}  // namespace golden\n");
   return 0;
 }

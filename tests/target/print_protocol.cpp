@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints what the firmware library, built for the scalar of FLEXCOMP_SCALAR, answers on the host:
-//   print_protocol        the transcript that the targets must reach (golden_protocol_*.hpp)
-//   print_protocol set    a set as it lies in a slot, for the examples (firmware/examples/tx60l_set.h)
+//   print_protocol            CRC-32 of every entry of the transcript that targets must reach (golden_protocol_*.hpp)
+//   print_protocol entries    the entries themselves, to see what a target that differs should have answered
+//   print_protocol set        a set as it lies in a slot, for the examples (firmware/examples/tx60l_set.h)
 #include <cinttypes>
 #include <cstdio>
 #include <cstring>
@@ -15,23 +16,18 @@ namespace {
 
 /// An exchange that only collected refusals would be equal everywhere and say nothing.
 const char* what_is_missing(const protocol::Transcript& t) {
-  unsigned entries[256] = {};
   unsigned corrected = 0;
   unsigned exceptions = 0;
   unsigned aborts = 0;
   std::uint32_t sequences[8] = {};
   unsigned states = 0;
-  for (std::size_t at = 0; at < t.size;) {
-    const unsigned what = t.bytes[at];
-    const std::size_t n = flexcomp::load_u16(t.bytes.data() + at + 1);
-    const std::uint8_t* bytes = t.bytes.data() + at + 3;
-    ++entries[what];
-    if (what == 'Q' && bytes[0] == FLEXCOMP_OK) ++corrected;
-    if (what == 'R' && (bytes[1] & 0x80U) != 0) ++exceptions;
-    if (what == 'C' && n > 3 && bytes[3] == 0x80) ++aborts;
-    if (what == 'S' && states < 8) sequences[states++] = flexcomp::load_u32(bytes);
-    at += n + 3;
-  }
+  t.each([&](const std::uint8_t* entry, std::size_t size) {
+    const std::uint8_t* bytes = entry + 3;
+    if (entry[0] == 'Q' && bytes[0] == FLEXCOMP_OK) ++corrected;
+    if (entry[0] == 'R' && (bytes[1] & 0x80U) != 0) ++exceptions;
+    if (entry[0] == 'C' && size > 6 && bytes[3] == 0x80) ++aborts;
+    if (entry[0] == 'S' && states < 8) sequences[states++] = flexcomp::load_u32(bytes);
+  });
   if (t.full) return "the transcript is too small";
   if (corrected < 30) return "commands were not corrected";
   if (exceptions != 4) return "four exceptions of Modbus, no more";
@@ -46,6 +42,34 @@ void print_bytes(const char* type, const char* name, const std::uint8_t* bytes, 
   for (std::size_t k = 0; k < size; ++k)
     std::printf("%s%u", k == 0 ? "\n    " : k % 32 == 0 ? ",\n    " : ", ", static_cast<unsigned>(bytes[k]));
   std::printf("};\n");
+}
+
+void print_entries(const protocol::Transcript& transcript) {
+  std::size_t k = 0;
+  transcript.each([&](const std::uint8_t* entry, std::size_t size) {
+    std::printf("%zu %c", k++, entry[0]);
+    for (std::size_t i = 3; i < size; ++i) std::printf(" %02x", static_cast<unsigned>(entry[i]));
+    std::printf("\n");
+  });
+}
+
+void print_checksums(const protocol::Transcript& transcript) {
+  std::printf(
+      "#pragma once\n// Printed by print_protocol.cpp on the host; \"cmake --build --preset host --target "
+      "golden\" "
+      "writes it anew.\n// clang-format off\n#include <cstdint>\n\nnamespace golden {\n\n"
+      "constexpr std::uint32_t protocol_in_%s[] = {",
+      sizeof(flexcomp_real) == 4 ? "float" : "double");
+  std::size_t k = 0;
+  transcript.each([&](const std::uint8_t* entry, std::size_t size) {
+    std::printf("%s0x%08" PRIx32,
+                k == 0        ? "\n    "
+                : k % 12 == 0 ? ",\n    "
+                              : ", ",
+                flexcomp::crc32(entry, size));
+    ++k;
+  });
+  std::printf("};\n\n}  // namespace golden\n");
 }
 
 int print_set(const selftest::Image& image, const protocol::Exchange& exchange) {
@@ -100,13 +124,10 @@ int main(int argc, char** argv) {
     return 1;
   }
   if (argc == 2 && std::strcmp(argv[1], "set") == 0) return print_set(image, *exchange);
-  std::printf(
-      "#pragma once\n// Printed by print_protocol.cpp on the host; \"cmake --build --preset host --target "
-      "golden\" "
-      "writes it anew.\n// clang-format off\n#include <cstdint>\n\nnamespace golden {\n\n");
-  print_bytes("constexpr std::uint8_t",
-              sizeof(flexcomp_real) == 4 ? "protocol_in_float" : "protocol_in_double",
-              transcript->bytes.data(), transcript->size);
-  std::printf("\n}  // namespace golden\n");
+  if (argc == 2 && std::strcmp(argv[1], "entries") == 0) {
+    print_entries(*transcript);
+  } else {
+    print_checksums(*transcript);
+  }
   return 0;
 }

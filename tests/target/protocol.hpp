@@ -3,7 +3,8 @@
 // One exchange with the whole firmware library that host and targets both go through, by flexcomp.h and nothing else:
 // a set comes in over Modbus RTU, is committed, followed for some cycles, read back and probed; a second one comes
 // over CANopen; both buses are asked for what they do not have. Every byte that the library sends, every command that
-// it corrects and every state that it reports goes into a transcript. The host prints it, the targets compare.
+// it corrects and every state that it reports goes into a transcript. The host prints the CRC-32 of each entry, the targets
+// compare.
 #include <flexcomp.h>
 
 #include <array>
@@ -37,6 +38,15 @@ struct Transcript {
     flexcomp::store_u16(bytes.data() + size + 1, static_cast<std::uint16_t>(n));
     std::memcpy(bytes.data() + size + 3, from, n);
     size += n + 3;
+  }
+
+  /// Calls use(entry, bytes) for every entry, letter and length included.
+  template <class Use>
+  void each(Use use) const {
+    for (std::size_t at = 0, n = 0; at < size; at += n) {
+      n = 3U + flexcomp::load_u16(bytes.data() + at + 1);
+      use(bytes.data() + at, n);
+    }
   }
 };
 

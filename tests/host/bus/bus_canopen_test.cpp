@@ -14,19 +14,21 @@
 #include <thread>
 #include <utility>
 
-#include "bus/canopen_client.hpp"
 #include "bus/sdo_client.hpp"
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
 #include "host/bus/bus_fake_controller.hpp"
+#include "support/thrown.hpp"
 
 namespace flexcomp::host {
 namespace {
 
 namespace co = wire::canopen;
 using fake::numbered_bytes;
+using fake::quick;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+using support::thrown;
 using testing::HasSubstr;
 
 constexpr std::uint8_t node = 5;
@@ -239,13 +241,9 @@ TEST(SdoClient, SaysAnAbortInWords) {
   server.read = [](ObjectAddress, Bytes&) { return 0x06020000U; };
   Bus bus(std::ref(server));
   SdoClient client(bus.near(), node, milliseconds(1000));
-  try {
-    client.upload({0x2003, 0});
-    FAIL();
-  } catch (const SdoAbort& e) {
-    EXPECT_TRUE(e.by_server());
-    EXPECT_STREQ(e.what(), "SDO abort 0602 0000, object does not exist at 0x2003:0");
-  }
+  const SdoAbort e = thrown<SdoAbort>([&] { client.upload({0x2003, 0}); });
+  EXPECT_TRUE(e.by_server());
+  EXPECT_STREQ(e.what(), "SDO abort 0602 0000, object does not exist at 0x2003:0");
 }
 
 TEST(SdoClient, GivesUpInTimeAndTellsTheServer) {
@@ -282,51 +280,42 @@ TEST(SdoClient, TakesNoOtherFrameForItsAnswer) {
 }
 
 TEST(SdoClient, StopsAServerThatMakesNoSense) {
-  const auto code_of = [](const std::function<void(OneObject&)>& spoil, bool upload) -> std::uint32_t {
+  for (const bool upload : {true, false}) {
     OneObject far;
     far.value = numbered_bytes(30);
-    spoil(far);
+    far.server.wrong_toggle = 2;
     std::atomic<std::uint32_t> told{0};
     far.server.on_abort = [&told](std::uint32_t code) { told = code; };
     Bus bus(std::ref(far.server));
     SdoClient client(bus.near(), node, milliseconds(300));
-    try {
+    const SdoAbort e = thrown<SdoAbort>([&] {
       if (upload) {
         client.upload({0x2010, 2});
       } else {
         client.download({0x2010, 1}, numbered_bytes(30));
       }
-    } catch (const SdoAbort& e) {
-      for (int k = 0; k < 100 && told == 0; ++k) std::this_thread::sleep_for(milliseconds(2));
-      EXPECT_FALSE(e.by_server());
-      EXPECT_EQ(told, e.code());
-      return e.code();
-    }
-    return 0;
-  };
-  EXPECT_EQ(code_of([](OneObject& o) { o.server.wrong_toggle = 2; }, true), co::abort::toggle);
-  EXPECT_EQ(code_of([](OneObject& o) { o.server.wrong_toggle = 2; }, false), co::abort::toggle);
+    });
+    for (int k = 0; k < 100 && told == 0; ++k) std::this_thread::sleep_for(milliseconds(2));
+    EXPECT_FALSE(e.by_server());
+    EXPECT_EQ(told, e.code());
+    EXPECT_EQ(e.code(), co::abort::toggle);
+  }
   // More than was announced.
   Bus bus([](const can_frame& in, const auto& put) {
     if (in.data[0] == 0x40) put(frame_of(0x585, {0x41, 0x10, 0x20, 2, 9}));
     if (in.data[0] >> 5 == 3) put(frame_of(0x585, {in.data[0] & 0x10U, 1, 2, 3, 4, 5, 6, 7}));
   });
   SdoClient client(bus.near(), node, milliseconds(300));
-  try {
-    client.upload({0x2010, 2});
-    FAIL();
-  } catch (const SdoAbort& e) {
-    EXPECT_EQ(e.code(), co::abort::too_long);
-  }
+  EXPECT_EQ(thrown<SdoAbort>([&] { client.upload({0x2010, 2}); }).code(), co::abort::too_long);
 }
 
 /// The object dictionary of a controller.
-struct Device : fake::Controller {
+struct CanopenDevice : fake::Controller {
   SdoServer server;
   std::uint32_t argument = 0;
   Bytes answer_bytes = Bytes(wire::probe_response_bytes);
 
-  Device() {
+  CanopenDevice() {
     constexpr auto little = wire::ByteOrder::little;
     server.read = [this](ObjectAddress o, Bytes& out) -> std::uint32_t {
       if (o.index == co::capability) return out = capability_record(little), 0;
@@ -358,20 +347,16 @@ struct Device : fake::Controller {
   }
 };
 
-const BusAddress address{CanAddress{"vcan9", node}};
-
-ClientOptions quick() {
-  ClientOptions out;
-  out.response_timeout = milliseconds(600);
-  out.write_timeout = milliseconds(500);
-  return out;
+/// A client of what answers on a bus.
+std::unique_ptr<ControllerClient> client_on(Bus& bus) {
+  return connect_canopen({CanAddress{"vcan9", node}}, quick(), bus.give());
 }
 
 TEST(CanopenClient, PushesAndReadsBack) {
-  Device device;
+  CanopenDevice device;
   device.working_polls = 3;
   Bus bus(std::ref(device.server));
-  const auto client = connect_canopen(address, quick(), bus.give());
+  const auto client = client_on(bus);
   EXPECT_EQ(client->capability().terms, 64);
   const Bytes image = numbered_bytes(1001);
   std::size_t reported = 0;
@@ -386,10 +371,10 @@ TEST(CanopenClient, PushesAndReadsBack) {
 TEST(CanopenClient, LosesOneFrameAndGoesOn) {
   // Each answer of a push in turn is lost, but not the one to a command, which must not be given twice.
   for (const int lost : {0, 5, 40, 100, 150}) {
-    Device device;
+    CanopenDevice device;
     device.server.drop_answer = lost;
     Bus bus(std::ref(device.server));
-    const auto client = connect_canopen(address, quick(), bus.give());
+    const auto client = client_on(bus);
     const Bytes image = numbered_bytes(1001);
     push_image(*client, image);
     EXPECT_EQ(device.active, image) << lost;
@@ -397,97 +382,73 @@ TEST(CanopenClient, LosesOneFrameAndGoesOn) {
 }
 
 TEST(CanopenClient, SaysWhyASetWasRefused) {
-  Device device;
+  CanopenDevice device;
   device.verify_refuses = Refusal::unknown_basis;
   Bus bus(std::ref(device.server));
-  const auto client = connect_canopen(address, quick(), bus.give());
-  try {
-    push_image(*client, numbered_bytes(100));
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_EQ(e.refusal(), Refusal::unknown_basis);
-    EXPECT_STREQ(
-        e.what(),
-        "can:vcan9:5: asked to verify the set, the controller refused: the image has a basis that the "
-        "controller does not evaluate (basis 23) (SDO abort 0604 0043, general parameter incompatibility at "
-        "0x2011:2)");
-  }
+  const auto client = client_on(bus);
+  const RefusedByController e =
+      thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(100)); });
+  EXPECT_EQ(e.refusal(), Refusal::unknown_basis);
+  EXPECT_STREQ(
+      e.what(),
+      "can:vcan9:5: asked to verify the set, the controller refused: the image has a basis that the "
+      "controller does not evaluate (basis 23) (SDO abort 0604 0043, general parameter incompatibility at "
+      "0x2011:2)");
   EXPECT_TRUE(device.active.empty());
   EXPECT_TRUE(device.staged.empty());
 }
 
 TEST(CanopenClient, WaitsForABusyControllerButNotForEver) {
-  Device device;
+  CanopenDevice device;
   device.busy = 3;
   Bus bus(std::ref(device.server));
-  const auto client = connect_canopen(address, quick(), bus.give());
+  const auto client = client_on(bus);
   push_image(*client, numbered_bytes(50));
   EXPECT_EQ(device.active.size(), 50U);
   device.busy = 1000000;
-  try {
-    push_image(*client, numbered_bytes(60));
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_EQ(e.answer(), wire::Answer::busy);
-    EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s"));
-  }
+  const RefusedByController e = thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(60)); });
+  EXPECT_EQ(e.answer(), wire::Answer::busy);
+  EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s"));
   device.busy = 0;
   device.working_polls = 1000000;
   EXPECT_THROW(client->run(wire::Command::commit), NoAnswer);
 }
 
 TEST(CanopenClient, ProbesWithAllBits) {
-  Device device;
+  CanopenDevice device;
   Bus bus(std::ref(device.server));
-  const auto client = connect_canopen(address, quick(), bus.give());
-  wire::ProbeRequest request;
-  for (std::size_t j = 0; j < 6; ++j) request.q_rad[j] = bits_of(0.1 * static_cast<double>(j) + 1e-17);
-  request.payload_kg = bits_of(1.0 / 3);
-  request.relative_speed[5] = bits_of(-0.7);
-  const wire::ProbeResponse response = client->probe(request);
-  EXPECT_EQ(response.q_rad[3], bits_of((0.1 * 3 + 1e-17) / 2));
-  EXPECT_EQ(response.position_m, bits_of(1.0 / 3));
-  EXPECT_EQ(response.orientation_rad, bits_of(-0.7));
-  EXPECT_EQ(response.status, 1);
+  const auto client = client_on(bus);
+  fake::expect_exact_probe(*client);
 }
 
 TEST(CanopenClient, SaysWhoDidNotAnswer) {
   Bus bus([](const can_frame&, const auto&) {});
   const auto start = steady_clock::now();
-  try {
-    connect_canopen(address, quick(), bus.give());
-    FAIL();
-  } catch (const NoAnswer& e) {
-    EXPECT_STREQ(e.what(),
-                 "can:vcan9:5: node 5 did not answer when asked to read object 0x2000:0 (3 waits of 0.20 s): "
-                 "no answer "
-                 "about 0x2000:0");
-  }
+  EXPECT_STREQ(thrown<NoAnswer>([&] { client_on(bus); }).what(),
+               "can:vcan9:5: node 5 did not answer when asked to read object 0x2000:0 (3 waits of 0.20 s): "
+               "no answer "
+               "about 0x2000:0");
   EXPECT_LT(steady_clock::now() - start, milliseconds(1500));
 }
 
 TEST(CanopenClient, RefusesWhatIsNoController) {
   {
-    Device device;
+    CanopenDevice device;
     device.capability.protocol = 0x0200;
     Bus bus(std::ref(device.server));
-    EXPECT_THROW(connect_canopen(address, quick(), bus.give()), BusError);
+    EXPECT_THROW(client_on(bus), BusError);
   }
   SdoServer other;
   other.read = [](ObjectAddress, Bytes& out) { return out = {1, 2, 3, 4}, 0U; };
   Bus bus(std::ref(other));
-  try {
-    connect_canopen(address, quick(), bus.give());
-    FAIL();
-  } catch (const BusError& e) {
-    EXPECT_STREQ(e.what(), "can:vcan9:5: object 0x2000:0 of node 5 has 4 bytes, expected 128");
-  }
+  EXPECT_STREQ(thrown<BusError>([&] { client_on(bus); }).what(),
+               "can:vcan9:5: object 0x2000:0 of node 5 has 4 bytes, expected 128");
 }
 
 TEST(CanopenClient, TellsTheRobotOrAsksForIt) {
-  Device device;
+  CanopenDevice device;
   Bus bus(std::ref(device.server));
-  const auto client = connect_canopen(address, quick(), bus.give());
+  const auto client = client_on(bus);
   const Robot robot = robot_of(*client, "");
   EXPECT_EQ(robot.name, "fake");
   EXPECT_EQ(robot.nominal.links[1].a_m, 0.4);
@@ -495,12 +456,7 @@ TEST(CanopenClient, TellsTheRobotOrAsksForIt) {
   device.robot.links[1].a_m = 0.41;
   EXPECT_THROW(robot_of(*client, ""), BusError);
   device.tells_robot = false;
-  try {
-    robot_of(*client, "");
-    FAIL();
-  } catch (const BusError& e) {
-    EXPECT_EQ(e.code(), ErrorCode::unknown_robot);
-  }
+  EXPECT_EQ(thrown<BusError>([&] { robot_of(*client, ""); }).code(), ErrorCode::unknown_robot);
 }
 
 }  // namespace

@@ -4,12 +4,16 @@
 #ifndef FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
 #define FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "bus/controller_client.hpp"
 #include "flexcomp/bytes.hpp"
 #include "flexcomp/robot.hpp"
 #include "flexcomp/wire/robot_record.hpp"
@@ -132,6 +136,24 @@ inline Bytes numbered_bytes(std::size_t size) {
   Bytes out(size);
   for (std::size_t k = 0; k < size; ++k) out[k] = static_cast<std::uint8_t>(k * 37U + (k >> 8U));
   return out;
+}
+
+inline host::ClientOptions quick() {
+  return {.response_timeout = std::chrono::milliseconds(600),
+          .write_timeout = std::chrono::milliseconds(500)};
+}
+
+/// A probe of the controller above comes back with every bit.
+inline void expect_exact_probe(host::ControllerClient& client) {
+  wire::ProbeRequest request;
+  for (std::size_t j = 0; j < 6; ++j) request.q_rad[j] = bits_of(0.1 * static_cast<double>(j) + 1e-17);
+  request.payload_kg = bits_of(1.0 / 3);
+  request.relative_speed[5] = bits_of(-0.7);
+  const wire::ProbeResponse response = client.probe(request);
+  EXPECT_EQ(response.q_rad[3], bits_of((0.1 * 3 + 1e-17) / 2));
+  EXPECT_EQ(response.position_m, bits_of(1.0 / 3));
+  EXPECT_EQ(response.orientation_rad, bits_of(-0.7));
+  EXPECT_EQ(response.status, 1);
 }
 
 }  // namespace flexcomp::fake

@@ -20,31 +20,27 @@
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/modbus_map.hpp"
 #include "host/bus/bus_fake_controller.hpp"
+#include "support/thrown.hpp"
 
 namespace flexcomp::host {
 namespace {
 
 namespace map = wire::modbus;
 using fake::numbered_bytes;
+using fake::quick;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+using support::thrown;
 using testing::HasSubstr;
 
-ClientOptions quick() {
-  ClientOptions out;
-  out.response_timeout = milliseconds(600);
-  out.write_timeout = milliseconds(500);
-  return out;
-}
-
 /// The register map over the fake controller, in a thread. libmodbus parses requests and builds answers.
-class Server {
+class ModbusServer {
  public:
   fake::Controller device;
   std::atomic<bool> silent{false};
   std::atomic<int> lose{0};  ///< so many answers are lost
 
-  explicit Server(bool serial) : serial_(serial) {
+  explicit ModbusServer(bool serial) : serial_(serial) {
     if (serial) {
       master_ = ::posix_openpt(O_RDWR | O_NOCTTY);
       EXPECT_EQ(::grantpt(master_), 0);
@@ -73,7 +69,7 @@ class Server {
     registers_ = modbus_mapping_new(0, 0, 0x1000, 0);
     thread_ = std::thread([this] { serial_ ? serve() : accept_and_serve(); });
   }
-  ~Server() {
+  ~ModbusServer() {
     stop_ = true;
     thread_.join();
     modbus_mapping_free(registers_);
@@ -86,6 +82,8 @@ class Server {
     if (serial_) return {ModbusRtuAddress{device_path, 115200, Parity::none, 7}};
     return {ModbusTcpAddress{"127.0.0.1", port, 255}};
   }
+
+  std::unique_ptr<ControllerClient> client() const { return connect(address(), quick()); }
 
   std::uint16_t port = 0;
   std::string device_path;
@@ -208,14 +206,16 @@ class Server {
   std::thread thread_;
 };
 
-class ModbusClient : public testing::TestWithParam<bool> {};
+class ModbusClient : public testing::TestWithParam<bool> {
+ protected:
+  ModbusServer server{GetParam()};
+};
 INSTANTIATE_TEST_SUITE_P(Lines, ModbusClient, testing::Values(false, true),
                          [](const auto& line) { return line.param ? "Rtu" : "Tcp"; });
 
 TEST_P(ModbusClient, PushesAndReadsBack) {
-  Server server(GetParam());
   server.device.working_polls = 3;
-  const auto client = connect(server.address(), quick());
+  const auto client = server.client();
   EXPECT_EQ(client->capability().values, 768U);
   // Whole windows, an odd length, less than a window.
   for (const std::size_t size : {484, 1001, 100, 2000, 246}) {
@@ -227,48 +227,33 @@ TEST_P(ModbusClient, PushesAndReadsBack) {
 }
 
 TEST_P(ModbusClient, SaysWhyASetWasRefused) {
-  Server server(GetParam());
   server.device.verify_refuses = Refusal::wrong_nominal;
-  const auto client = connect(server.address(), quick());
-  try {
-    push_image(*client, numbered_bytes(100));
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_EQ(e.answer(), wire::Answer::refused);
-    EXPECT_EQ(e.refusal(), Refusal::wrong_nominal);
-    EXPECT_EQ(std::string(e.what()), client->where() +
-                                         ": asked to verify the set, the controller refused: the image is "
-                                         "for another nominal geometry (Modbus "
-                                         "exception 04, server device failure)");
-  }
+  const auto client = server.client();
+  const RefusedByController e =
+      thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(100)); });
+  EXPECT_EQ(e.answer(), wire::Answer::refused);
+  EXPECT_EQ(e.refusal(), Refusal::wrong_nominal);
+  EXPECT_EQ(std::string(e.what()), client->where() +
+                                       ": asked to verify the set, the controller refused: the image is "
+                                       "for another nominal geometry (Modbus "
+                                       "exception 04, server device failure)");
   EXPECT_TRUE(server.device.active.empty());
   EXPECT_TRUE(server.device.staged.empty());
-  try {
-    client->run(wire::Command::rollback);
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_THAT(e.what(), HasSubstr("asked to roll back, the controller refused: there is no previous set"));
-  }
+  EXPECT_THAT(thrown<RefusedByController>([&] { client->run(wire::Command::rollback); }).what(),
+              HasSubstr("asked to roll back, the controller refused: there is no previous set"));
 }
 
 TEST_P(ModbusClient, SaysWhatFailedInTheBackground) {
-  Server server(GetParam());
   server.device.commit_ends = wire::Answer::storage_failed;
   server.device.working_polls = 2;
-  const auto client = connect(server.address(), quick());
-  try {
-    push_image(*client, numbered_bytes(100));
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_THAT(e.what(),
-                HasSubstr("asked to commit the set, the controller failed: the controller's non-volatile"));
-  }
+  const auto client = server.client();
+  EXPECT_THAT(thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(100)); }).what(),
+              HasSubstr("asked to commit the set, the controller failed: the controller's non-volatile"));
 }
 
 TEST_P(ModbusClient, JudgesACommitByWhatItDid) {
-  Server server(GetParam());
   server.device.overtaken = true;
-  const auto client = connect(server.address(), quick());
+  const auto client = server.client();
   push_image(*client, numbered_bytes(100));
   EXPECT_EQ(server.device.active.size(), 100U);
   server.device.commit_ends = wire::Answer::wrong_state;
@@ -276,90 +261,58 @@ TEST_P(ModbusClient, JudgesACommitByWhatItDid) {
 }
 
 TEST_P(ModbusClient, FindsADamagedSet) {
-  Server server(GetParam());
   server.device.damages_image = true;
-  const auto client = connect(server.address(), quick());
-  try {
-    push_image(*client, numbered_bytes(100));
-    FAIL();
-  } catch (const BusError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("byte 50 of the active set is 0x3B after the commit, 0x3A was sent"));
-  }
+  const auto client = server.client();
+  EXPECT_THAT(thrown<BusError>([&] { push_image(*client, numbered_bytes(100)); }).what(),
+              HasSubstr("byte 50 of the active set is 0x3B after the commit, 0x3A was sent"));
 }
 
 TEST_P(ModbusClient, ProbesWithAllBitsAndTellsTheRobot) {
-  Server server(GetParam());
-  const auto client = connect(server.address(), quick());
-  wire::ProbeRequest request;
-  for (std::size_t j = 0; j < 6; ++j) request.q_rad[j] = bits_of(0.1 * static_cast<double>(j) + 1e-17);
-  request.payload_kg = bits_of(1.0 / 3);
-  request.relative_speed[5] = bits_of(-0.7);
-  const wire::ProbeResponse response = client->probe(request);
-  EXPECT_EQ(response.q_rad[3], bits_of((0.1 * 3 + 1e-17) / 2));
-  EXPECT_EQ(response.position_m, bits_of(1.0 / 3));
-  EXPECT_EQ(response.orientation_rad, bits_of(-0.7));
+  const auto client = server.client();
+  fake::expect_exact_probe(*client);
   EXPECT_EQ(robot_of(*client, "").nominal.links[1].a_m, 0.4);
   server.device.tells_robot = false;
   EXPECT_FALSE(client->robot().has_value());
 }
 
 TEST_P(ModbusClient, WaitsForABusyControllerButNotForEver) {
-  Server server(GetParam());
   server.device.busy = 3;
-  const auto client = connect(server.address(), quick());
+  const auto client = server.client();
   push_image(*client, numbered_bytes(50));
   server.device.busy = 1000000;
-  try {
-    client->run(wire::Command::verify);
-    FAIL();
-  } catch (const RefusedByController& e) {
-    EXPECT_EQ(e.answer(), wire::Answer::busy);
-    EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s (Modbus exception 06, server device busy)"));
-  }
+  const RefusedByController e = thrown<RefusedByController>([&] { client->run(wire::Command::verify); });
+  EXPECT_EQ(e.answer(), wire::Answer::busy);
+  EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s (Modbus exception 06, server device busy)"));
 }
 
 TEST_P(ModbusClient, SaysWhoDidNotAnswerAndWhen) {
-  Server server(GetParam());
   server.silent = true;
   const auto start = steady_clock::now();
-  try {
-    connect(server.address(), quick());
-    FAIL();
-  } catch (const NoAnswer& e) {
-    EXPECT_THAT(e.what(), HasSubstr(server.address().text()));
-    EXPECT_THAT(e.what(), HasSubstr("did not answer when asked to read 64 registers from 0x0000"));
-  }
+  const NoAnswer e = thrown<NoAnswer>([&] { server.client(); });
+  EXPECT_THAT(e.what(), HasSubstr(server.address().text()));
+  EXPECT_THAT(e.what(), HasSubstr("did not answer when asked to read 64 registers from 0x0000"));
   EXPECT_LT(steady_clock::now() - start, milliseconds(2000));
 }
 
 TEST(ModbusRtuClient, LosesAnAnswerAndAsksAgain) {
-  Server server(true);
+  ModbusServer server(true);
   server.lose = 2;
-  const auto client = connect(server.address(), quick());
+  const auto client = server.client();
   EXPECT_EQ(client->capability().terms, 64);
 }
 
 TEST(ModbusRtuClient, TakesTurnsOnOneLine) {
-  Server server(true);
-  auto first = connect(server.address(), quick());
-  try {
-    connect(server.address(), quick());
-    FAIL();
-  } catch (const BusError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("another program on this machine has been using"));
-  }
+  ModbusServer server(true);
+  auto first = server.client();
+  EXPECT_THAT(thrown<BusError>([&] { server.client(); }).what(),
+              HasSubstr("another program on this machine has been using"));
   first.reset();
-  EXPECT_NO_THROW(connect(server.address(), quick()));
+  EXPECT_NO_THROW(server.client());
 }
 
 TEST(ModbusClientOpening, SaysWhatCannotBeOpened) {
   const auto complaint = [](const BusAddress& address) -> std::string {
-    try {
-      connect(address, quick());
-    } catch (const BusError& e) {
-      return e.what();
-    }
-    return "opened";
+    return thrown<BusError>([&] { connect(address, quick()); }).what();
   };
   EXPECT_EQ(complaint({ModbusRtuAddress{"/dev/no-such-line"}}),
             "modbus-rtu:/dev/no-such-line:19200:E:1: cannot be opened: No such file or directory");

@@ -5,12 +5,6 @@
 set -uo pipefail
 source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
 identify() { "$flexcomp" identify --robot "$robot" --data "$1" -o "${1%.csv}.yaml" --quiet "${@:2}"; }
-absent() {
-  if [[ -e $1 ]]; then
-    echo "FAIL: $1 was left behind"
-    failures=$((failures + 1))
-  fi
-}
 
 expect_all 0 -- "$flexcomp" simulate --robot "$robot" --truth "$truth" --poses 30 --seed 1 -o good.csv --quiet
 expect_all 0 -- identify good.csv

@@ -15,6 +15,12 @@ fail() {
   failures=$((failures + 1))
 }
 
+# absent FILE…: a refused command has left none of them
+absent() {
+  local file
+  for file in "$@"; do [[ ! -e $file ]] || fail "$file was left behind"; done
+}
+
 # expect_all STATUS PATTERN… -- COMMAND…: exit status, and every pattern is in what the command says, which is left in out.txt
 expect_all() {
   local status=$1 patterns=() pattern got begin=$SECONDS

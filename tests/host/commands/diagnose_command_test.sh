@@ -4,10 +4,6 @@
 # held-out rows may and may not change, bad input, exit statuses, the files that are left.
 set -uo pipefail
 source "${FLEXCOMP_SOURCE_DIR:?}/tests/host/commands/common.sh"
-absent() {
-  local file
-  for file in "$@"; do [[ ! -e $file ]] || fail "$file was left behind"; done
-}
 diagnose() { "$flexcomp" diagnose --robot "$robot" "$@"; }
 simulate() { "$flexcomp" simulate --robot "$robot" --quiet --noise N1 "$@"; }
 # judge CASE FILE…

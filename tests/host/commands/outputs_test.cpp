@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // No output of a run may be one of its inputs or another of its outputs, whatever the file is called.
-#include "commands/outputs.hpp"
+#include "commands/common_options.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

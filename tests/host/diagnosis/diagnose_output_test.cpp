@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "commands/diagnosis_text.hpp"
+#include "commands/result_text.hpp"
 #include "diagnosis/diagnosis_json.hpp"
 #include "diagnosis/effect_profile.hpp"
 #include "diagnosis/held_out.hpp"
@@ -152,7 +152,7 @@ TEST(EffectProfile, IsTheEffectAndTheRowsLieOnIt) {
   EffectId curve = of_joint(Effect::joint_curve, 1);
   const std::vector<double> c{1e-4, -2e-4, 3e-4, -4e-4, 3e-4, -3e-4, 1e-4, 2e-4};
   curve.coefficients = c.size();
-  judge_profile(Hidden(curve, c), [&](double x) { return arms::curve_value(c, radians(x)); });
+  judge_profile(Hidden(curve, c), [&](double x) { return plain::curve(c, radians(x)); });
   judge_profile(Hidden(of_joint(Effect::encoder_scale, 2), {4e-4}),
                 [](double x) { return 4e-4 * radians(x); });
   EffectId coupling = of_joint(Effect::joint_coupling, 6);
