@@ -20,7 +20,7 @@
 #include "flexcomp/bytes.hpp"
 #include "json.hpp"
 #include "model/parameter_image.hpp"
-#include "model/set_difference_json.hpp"
+#include "model/set_difference.hpp"
 
 namespace flexcomp::host {
 namespace {
