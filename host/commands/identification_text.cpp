@@ -9,7 +9,6 @@
 
 #include "commands/accuracy.hpp"
 #include "commands/colour.hpp"
-#include "identification/fitted_parameters.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

@@ -21,7 +21,6 @@
 #include "flexcomp/model.hpp"
 #include "input_error.hpp"
 #include "linalg/decompositions.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "model/effects.hpp"
 #include "model/frames.hpp"
 #include "model/host_model.hpp"

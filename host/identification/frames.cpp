@@ -9,7 +9,6 @@
 #include "identification/identifiability.hpp"
 #include "identification/statistics.hpp"
 #include "linalg/decompositions.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
 

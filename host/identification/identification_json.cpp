@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "identification/identification_json.hpp"
 
-#include "identification/fitted_parameters.hpp"
 #include "json.hpp"
 #include "units.hpp"
 

@@ -29,12 +29,12 @@ struct FixedParameter {
 struct IdentifyOptions {
   ModelKind model = ModelKind::full;
   FrameChoice frames = FrameChoice::by_distance;
-  std::vector<FixedParameter> fixed;
-  std::vector<Tolerance> tolerances;  ///< of parameters by name; later ones win
-  bool physical = true;               ///< bounds compliances at zero
-  bool force = false;                 ///< accept residuals that suggest another unit or arm
-  std::uint64_t seed = 1;             ///< of the 1,000 random reference poses of the identifiability analysis
-  EstimatorOptions estimator;
+  std::vector<FixedParameter> fixed = {};
+  std::vector<Tolerance> tolerances = {};  ///< of parameters by name; later ones win
+  bool physical = true;                    ///< bounds compliances at zero
+  bool force = false;                      ///< accept residuals that suggest another unit or arm
+  std::uint64_t seed = 1;  ///< of the 1,000 random reference poses of the identifiability analysis
+  EstimatorOptions estimator = {};
 };
 
 /// Errors of the nominal arm.
@@ -58,7 +58,7 @@ struct Identification {
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<std::size_t> outliers;   ///< down-weighted rows, by index
   std::optional<PureError>
-      pure_error;  ///< of repeated rows, outliers left out; nothing where none are repeated
+      pure_error;  ///< of repeated rows without outliers; nothing where none are repeated
   /// Reasons why the result is not reliable; empty where it is.
   std::vector<std::string> doubts;
 };
@@ -78,6 +78,20 @@ Before errors_before(const Robot& robot, const std::vector<Observation>& rows, E
 /// \throws InputError
 void require_plausible_residuals(const Robot& robot, const std::vector<Observation>& rows,
                                  const std::string& source, const Before& before);
+
+/// What is said of one fitted parameter, in the unit of files.
+struct FittedParameter {
+  std::string name;
+  double value = 0;
+  double sigma = 0;
+  double low = 0;
+  double high = 0;
+  bool at_bound = false;
+  /// Different from the nominal arm beyond chance: zero lies outside the 95 % interval.
+  bool significant() const { return low > 0 || high < 0; }
+};
+
+std::vector<FittedParameter> fitted_parameters(const Identification& r);
 
 }  // namespace flexcomp::host
 

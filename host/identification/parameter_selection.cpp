@@ -15,31 +15,12 @@ namespace {
 
 constexpr std::size_t reference_count = 1000;
 
-Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>& columns) {
-  Eigen::MatrixXd out(m.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    out.col(static_cast<Eigen::Index>(k)) = m.col(static_cast<Eigen::Index>(columns[k]));
-  }
-  return out;
-}
-
 /// Standard deviations in units from an information matrix.
 Eigen::VectorXd sigmas(const Eigen::MatrixXd& information) {
   return Ldlt(information).inverse().diagonal().cwiseMax(0).cwiseSqrt();
 }
 
 Eigen::MatrixXd information(const Eigen::MatrixXd& matrix) { return matrix.transpose() * matrix; }
-
-Eigen::MatrixXd select_both(const Eigen::MatrixXd& m, const std::vector<std::size_t>& kept) {
-  Eigen::MatrixXd out(kept.size(), kept.size());
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    for (std::size_t k = 0; k < kept.size(); ++k) {
-      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          m(static_cast<Eigen::Index>(kept[i]), static_cast<Eigen::Index>(kept[k]));
-    }
-  }
-  return out;
-}
 
 /// Test of weak identifiability: the rows' columns against the information of as many random rows.
 struct WeaknessTest {
@@ -56,8 +37,8 @@ struct WeaknessTest {
     const Eigen::MatrixXd here_all = information(data);
     std::vector<std::size_t> dropped;
     while (!kept.empty()) {
-      const Eigen::VectorXd here = sigmas(select_both(here_all, kept));
-      const Eigen::VectorXd there = sigmas(select_both(reference, kept));
+      const Eigen::VectorXd here = sigmas(here_all(kept, kept));
+      const Eigen::VectorXd there = sigmas(reference(kept, kept));
       std::size_t worst = kept.size();
       std::size_t latest = 0;
       for (std::size_t k = 0; k < kept.size(); ++k) {
@@ -228,14 +209,14 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
   if (!missing.empty()) {
     // In the elimination order, so that the same columns are tested as above; frames come first in it.
     WeaknessTest selected;
-    selected.data = select(data_matrix, possible_order);
-    selected.reference = select_both(test.reference, possible_order);
+    selected.data = data_matrix(Eigen::all, possible_order);
+    selected.reference = test.reference(possible_order, possible_order);
     selected.frames = static_cast<std::size_t>(std::count_if(possible_order.begin(), possible_order.end(),
                                                              [&](std::size_t c) { return c < test.frames; }));
-    out.suggested_poses = suggest_poses(selected, select(reference_matrix, possible_order), reference);
+    out.suggested_poses = suggest_poses(selected, reference_matrix(Eigen::all, possible_order), reference);
   } else if (one_payload(rows) && rows.front().context.payload_kg > 0 && has_stiffness(all, start.set)) {
     out.payload_gains = second_payload_gains(reference, start, *model, out.fitted,
-                                             sigmas(information(select(data_matrix, fitted_columns))));
+                                             sigmas(information(data_matrix(Eigen::all, fitted_columns))));
   }
   return out;
 }

@@ -2,7 +2,9 @@
 #include "identification/residuals.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
@@ -219,12 +221,10 @@ Linearised linearised(const Estimate& estimate, const HostModel& model, const st
 }
 
 std::vector<std::size_t> free_frames(const std::vector<Observation>& rows) {
-  std::size_t count = 9;
-  for (const Observation& row : rows) {
-    if (row.has_orientation) count = 12;
-  }
-  std::vector<std::size_t> all(count);
-  for (std::size_t i = 0; i < count; ++i) all[i] = i;
+  const bool oriented =
+      std::any_of(rows.begin(), rows.end(), [](const Observation& row) { return row.has_orientation; });
+  std::vector<std::size_t> all(oriented ? 12 : 9);
+  std::iota(all.begin(), all.end(), std::size_t{0});
   return all;
 }
 

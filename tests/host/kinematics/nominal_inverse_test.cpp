@@ -9,13 +9,12 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <string>
 #include <vector>
 
-#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "flexcomp/model.hpp"
 #include "support/arms.hpp"
+#include "support/robot_files.hpp"
 
 namespace {
 
@@ -24,7 +23,7 @@ using namespace flexcomp::host;
 
 TEST(NominalInverses, TheWayByWhichThePoseWasMadeIsAmongThem) {
   for (const char* name : {"kuka-kr6-r900", "abb-irb120", "tx60l", "rx160l", "ur5", "ur10"}) {
-    const Robot robot = load_robot(std::string(FLEXCOMP_SOURCE_DIR "/host/robots/") + name + ".yaml");
+    const Robot robot = support::robot(name);
     Model<double, joint_count, Capacity<1, 1, 6>> model;
     model.begin(robot.nominal);
     model.finish();
