@@ -18,8 +18,9 @@ namespace flexcomp::host {
 
 namespace {
 
-std::uint64_t scaled(double number, double effort) {
-  return static_cast<std::uint64_t>(std::max(1.0, std::round(number * effort)));
+template <class Number>
+std::uint64_t scaled(Number number, double effort) {
+  return static_cast<std::uint64_t>(std::max(1.0, std::round(static_cast<double>(number) * effort)));
 }
 
 using Speeds = std::array<double, joint_count>;
@@ -93,12 +94,9 @@ bool moves_joints(Method method) { return method == Method::refine || method == 
 std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, double effort,
                                     std::uint64_t seed) {
   switch (method) {
-    case Method::refine: {
-      RefineOptions options;
-      options.evaluations = scaled(static_cast<double>(options.evaluations), effort);
-      options.seed = seed;
-      return std::make_unique<RefineSearch>(problem, options);
-    }
+    case Method::refine:
+      return std::make_unique<RefineSearch>(
+          problem, RefineOptions{.evaluations = scaled(RefineOptions().evaluations, effort), .seed = seed});
     case Method::exchange: {
       ExchangeOptions options;
       // About seven rounds until nothing changes.
@@ -108,18 +106,12 @@ std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, d
       options.seed = seed;
       return std::make_unique<ExchangeSearch>(problem, options);
     }
-    case Method::detmax: {
-      DetmaxOptions options;
-      options.restarts = scaled(static_cast<double>(options.restarts), effort);
-      options.seed = seed;
-      return std::make_unique<DetmaxSearch>(problem, options);
-    }
-    case Method::sapso: {
-      SapsoOptions options;
-      options.iterations = scaled(static_cast<double>(options.iterations), effort);
-      options.seed = seed;
-      return std::make_unique<SapsoSearch>(problem, options);
-    }
+    case Method::detmax:
+      return std::make_unique<DetmaxSearch>(
+          problem, DetmaxOptions{.restarts = scaled(DetmaxOptions().restarts, effort), .seed = seed});
+    case Method::sapso:
+      return std::make_unique<SapsoSearch>(
+          problem, SapsoOptions{.iterations = scaled(SapsoOptions().iterations, effort), .seed = seed});
   }
   return nullptr;
 }
