@@ -67,6 +67,16 @@ std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<Stu
   return rows;
 }
 
+std::vector<Eigen::Vector3d> position_errors_m(const StudiedArm& arm, const TermSet& terms,
+                                               const std::vector<Observation>& rows) {
+  const auto model = prepare(terms, arm.robot, arm.name);
+  Workspace<double, joint_count> ws;
+  std::vector<Eigen::Vector3d> errors;
+  for (const Observation& row : rows)
+    errors.emplace_back(row.p_m - forward(*model, row.q_rad, row.context, ws).position);
+  return errors;
+}
+
 Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                        const ExperimentOptions& options)
     : arm_(arm), options_(options), clean_(clean_rows(arm, poses, options.orientations, options.noise)) {
@@ -101,9 +111,7 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
   every.parameters = full.parameters;
   const Elimination possible = possible_columns(arm.robot, many, nominal, every, structure_seed);
   for (const std::size_t c : possible.kept) complete.parameters.push_back(every.parameters[c]);
-  EstimatorOptions exact;
-  exact.robust = false;
-  const Fit without_noise = fit(nominal, complete, many, arm.robot, exact);
+  const Fit without_noise = fit(nominal, complete, many, arm.robot, {.robust = false});
   if (!without_noise.converged) throw std::runtime_error("the noise-free fit did not converge");
   at_truth_ = without_noise.estimate;
   truth_.resize(static_cast<Eigen::Index>(unknowns_.parameters.size()));
@@ -129,9 +137,8 @@ Estimate Experiment::calibrate(std::uint64_t seed) const {
 
 Estimate Experiment::from(const std::vector<Observation>& measured) const {
   if (options_.method == Estimation::m_lm || options_.method == Estimation::ours) {
-    EstimatorOptions how;
-    how.robust = options_.method == Estimation::ours;
-    return fit(start_, unknowns_, measured, arm_.robot, how).estimate;
+    const bool robust = options_.method == Estimation::ours;
+    return fit(start_, unknowns_, measured, arm_.robot, {.robust = robust}).estimate;
   }
   std::vector<Observation> rows = measured;
   if (options_.method == Estimation::unweighted) {
