@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "diagnosis/bump_functions.hpp"
+// Unnamed functions that are concentrated near one pair of joint readings (D10).
 
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/smooth_functions.hpp"
 #include "diagnosis/spline.hpp"
 
 namespace flexcomp::host {

@@ -59,6 +59,16 @@ Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variab
 /// that stays is put into `gain`.
 Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain);
 
+/// The best bumps of two joint readings that turn a joint, best first; each has four parameters: size, two centres, width.
+std::vector<SmoothFunction> bump_functions(const GapSystem& system, const ResidualAnalysis& left,
+                                           const std::vector<Variable>& of, std::size_t most);
+
+/// Adds the effect `unnamed` with the bilinear table that is closest to a function (least squares; docs/model.md, M7).
+/// Nothing is added where the function follows the order of measurement, which no controller has.
+/// \param value  of its members, rad
+void add_smooth_table(const SmoothFunction& function, const Eigen::VectorXd& value,
+                      const std::vector<Variable>& variables, const Robot& robot, ParametricModel& model);
+
 }  // namespace flexcomp::host
 
 #endif
