@@ -57,9 +57,7 @@ void test_lack_of_fit(SearchResult& found) {
   if (found.unnamed) return;
   const double dof = found.system->numbers - left.fitted_numbers;
   const std::vector<PlaceShare> places = place_shares(*found.system, left);
-  const auto worst =
-      std::min_element(places.begin(), places.end(),
-                       [](const PlaceShare& a, const PlaceShare& b) { return a.p_value < b.p_value; });
+  const auto worst = std::ranges::min_element(places, {}, &PlaceShare::p_value);
   const bool too_large = dof >= 1 && left.chi2() > chi2_quantile(0.9995, dof);
   // One of some fifty places, at one in a thousand.
   const bool at_a_place = worst != places.end() && worst->p_value < 1e-3 / 50;
@@ -81,9 +79,9 @@ void test_lack_of_fit(SearchResult& found) {
 /// Whether both name the same effects.
 bool same_effects(const SearchResult& a, const SearchResult& b) {
   return a.hypotheses.size() == b.hypotheses.size() && a.unnamed == b.unnamed &&
-         std::all_of(a.hypotheses.begin(), a.hypotheses.end(), [&](const Hypothesis& p) {
-           return std::any_of(b.hypotheses.begin(), b.hypotheses.end(),
-                              [&](const Hypothesis& q) { return same_name(p.id, q.id); });
+         std::ranges::all_of(a.hypotheses, [&](const Hypothesis& p) {
+           return std::ranges::any_of(b.hypotheses,
+                                      [&](const Hypothesis& q) { return same_name(p.id, q.id); });
          });
 }
 

@@ -79,8 +79,7 @@ PermutationNull::PermutationNull(const SubsetSearch& search, const ResidualAnaly
 double PermutationNull::p_value(double gain) const {
   if (maxima_.empty()) return 1;
   const double n = static_cast<double>(maxima_.size());
-  const auto above =
-      static_cast<double>(std::count_if(maxima_.begin(), maxima_.end(), [&](double m) { return m >= gain; }));
+  const auto above = static_cast<double>(std::ranges::count_if(maxima_, [&](double m) { return m >= gain; }));
   if (above >= 10) return (1 + above) / (1 + n);
   double mean = 0;
   double square = 0;
@@ -147,15 +146,14 @@ std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution,
     // A rival is better than nothing.
     if (!(delta < decisive_bic) || !(gains[b] > 0)) continue;
     const auto known =
-        std::find_if(rivals.begin(), rivals.end(), [&](const Rival& r) { return same_name(r.id, block.id); });
+        std::ranges::find_if(rivals, [&](const Rival& r) { return same_name(r.id, block.id); });
     if (known == rivals.end()) {
       rivals.push_back({block.id, delta});
     } else if (delta < known->delta_bic) {
       *known = {block.id, delta};
     }
   }
-  std::sort(rivals.begin(), rivals.end(),
-            [](const Rival& a, const Rival& b) { return a.delta_bic < b.delta_bic; });
+  std::ranges::sort(rivals, {}, &Rival::delta_bic);
   return rivals;
 }
 
@@ -178,9 +176,7 @@ std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& sele
   for (const Hypothesis& h : found.hypotheses) {
     if (h.function) continue;
     // A second local fault of the same curve is no other effect.
-    if (std::any_of(effects.begin(), effects.end(),
-                    [&](const FoundEffect& e) { return same_name(e.id, h.id); }))
-      continue;
+    if (std::ranges::any_of(effects, [&](const FoundEffect& e) { return same_name(e.id, h.id); })) continue;
     FoundEffect effect;
     effect.id = h.id;
     const Subset without = without_effect(found, h.id);
@@ -194,8 +190,7 @@ std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& sele
     describe(effect, selection.refit, robot, *selection.rows, found.system->nuisance);
     effects.push_back(std::move(effect));
   }
-  std::stable_sort(effects.begin(), effects.end(),
-                   [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic > b.delta_bic; });
+  std::ranges::stable_sort(effects, std::ranges::greater(), &FoundEffect::delta_bic);
   return effects;
 }
 

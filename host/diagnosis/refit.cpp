@@ -28,7 +28,7 @@ struct CurveParts {
     if (whole) return true;
     const double at = 2 * pi * static_cast<double>(coefficient) / static_cast<double>(size);
     // All whose knot lies in the inner half of the spline's support.
-    return std::any_of(locals.begin(), locals.end(), [&](const LocalCurve* c) {
+    return std::ranges::any_of(locals, [&](const LocalCurve* c) {
       return std::abs(angle_difference(at, c->centre_rad)) < 1.5 * 2 * pi / static_cast<double>(c->knots);
     });
   }
@@ -176,8 +176,7 @@ FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
   const Estimate estimate = estimate_of(calibration);
   Unknowns all;
   if (calibration.frames) all.frames = free_frames(rows);
-  const bool has_sigma = std::any_of(calibration.sigma.begin(), calibration.sigma.end(),
-                                     [](double s) { return std::isfinite(s); });
+  const bool has_sigma = std::ranges::any_of(calibration.sigma, [](double s) { return std::isfinite(s); });
   for (Parameter& p : parameters_of(calibration.terms, robot.nominal)) {
     const std::vector<double>& sigma = p.value ? calibration.value_sigma : calibration.sigma;
     const std::size_t at = p.value ? *p.value : p.terms.front();

@@ -176,7 +176,7 @@ double cost_of(const Selection& selection) {
   const Scored& s = selection.found.solution;
   const double scale2 = search.noise_scale2();
   const ResidualAnalysis left = residual_after(search, s);
-  const auto masked = static_cast<double>(std::count(system.counts.begin(), system.counts.end(), false));
+  const auto masked = static_cast<double>(std::ranges::count(system.counts, false));
   return left.residual.squaredNorm() / scale2 + system.numbers * std::log(scale2) + (s.chi2_gain - s.gain) +
          search.margins(s.blocks) + masked * outlier_price;
 }

@@ -38,11 +38,11 @@ struct Bump {
 /// A smooth function of one or two variables that turns a joint: coefficients of members with a normal prior.
 struct SmoothFunction {
   Place place;
-  std::vector<std::size_t> of;  ///< indices of variables, one or two
-  double size_rad = 0;          ///< prior standard deviation of a coefficient
-  std::optional<Bump> bump;     ///< then it has this one member
-  int harmonics = 2;            ///< of each joint reading, in products
-  Eigen::VectorXd share;        ///< of the size, per member; members of 0 are left out; empty: all of it
+  std::vector<std::size_t> of = {};  ///< indices of variables, one or two
+  double size_rad = 0;               ///< prior standard deviation of a coefficient
+  std::optional<Bump> bump = {};     ///< then it has this one member
+  int harmonics = 2;                 ///< of each joint reading, in products
+  Eigen::VectorXd share = {};        ///< of the size, per member; members of 0 are left out; empty: all of it
   double gain = 0;  ///< evidence (D9): 2 ln of the Bayes factor, less 2 ln of the number of functions tried
 };
 std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const ResidualAnalysis& left,

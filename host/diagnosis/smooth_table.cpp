@@ -46,7 +46,7 @@ std::vector<double> nodes_of(const Bump& bump, std::size_t side, double low, dou
       if (at > low && at < high) nodes.push_back(at);
     }
   }
-  std::sort(nodes.begin(), nodes.end());
+  std::ranges::sort(nodes);
   nodes.erase(std::unique(nodes.begin(), nodes.end(), [](double a, double b) { return b - a < 1e-6; }),
               nodes.end());
   return nodes;
@@ -85,7 +85,7 @@ void add_smooth_table(const SmoothFunction& function, const Eigen::VectorXd& val
                       const std::vector<Variable>& variables, const Robot& robot, ParametricModel& model) {
   std::vector<const Variable*> of;
   for (const std::size_t v : function.of) of.push_back(&variables[v]);
-  if (std::any_of(of.begin(), of.end(), [](const Variable* v) { return v->is_order; })) return;
+  if (std::ranges::any_of(of, [](const Variable* v) { return v->is_order; })) return;
   const EffectId id = table_id(function, of);
   add_effect(model, id, robot.nominal);
   const Term<double>& term = model.set.terms.back();

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "identification/estimator.hpp"
-#include "identification/frames.hpp"
 #include "identification/parameter_selection.hpp"
 #include "identification/statistics.hpp"
 #include "measurement/repeats.hpp"
@@ -19,6 +18,8 @@
 #include "model/tolerance.hpp"
 
 namespace flexcomp::host {
+
+enum class FrameChoice { by_distance, nominal, fit };
 
 /// Parameter that is not fitted, with its given value.
 struct FixedParameter {
@@ -73,6 +74,13 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
 
 /// Errors of the nominal arm, in nominal and in fitted frames. \param fitted  receives the fitted frames, may be null
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
+
+/// Estimates the measurement frames F (robot base in the instrument's frame) and E (measured point in Ftool), Eq. (M2), for
+/// given terms (none: the nominal arm): closed-form start, then robust refinement.
+Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot);
+
+/// True where the nominal frames (F = E = 1) miss the median row by more than 20 mm or 2 degrees.
+bool nominal_frames_are_off(const std::vector<RowResidual>& nominal, const std::vector<Observation>& rows);
 
 /// Refuses residuals to the nominal arm above 100 times the usual 0.5 mm per metre of reach: another unit or arm.
 /// \throws InputError

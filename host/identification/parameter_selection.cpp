@@ -45,7 +45,7 @@ struct WeaknessTest {
         const Eigen::Index i = static_cast<Eigen::Index>(k);
         if (kept[k] < frames || !(here[i] > too_many && here[i] > too_many * there[i])) continue;
         const std::size_t position =
-            static_cast<std::size_t>(std::find(order.begin(), order.end(), kept[k]) - order.begin());
+            static_cast<std::size_t>(std::ranges::find(order, kept[k]) - order.begin());
         if (worst == kept.size() || position > latest) {
           worst = k;
           latest = position;
@@ -107,19 +107,19 @@ std::vector<SuggestedPose> suggest_poses(WeaknessTest test, const Eigen::MatrixX
 }
 
 bool has_stiffness(const Unknowns& unknowns, const TermSet& set) {
-  return std::any_of(unknowns.parameters.begin(), unknowns.parameters.end(), [&](const Parameter& p) {
+  return std::ranges::any_of(unknowns.parameters, [&](const Parameter& p) {
     return set.terms[p.terms.front()].effect == Effect::joint_compliance;
   });
 }
 
 bool one_payload(const std::vector<Observation>& rows) {
-  return std::all_of(rows.begin(), rows.end(), [&](const Observation& row) {
+  return std::ranges::all_of(rows, [&](const Observation& row) {
     return std::abs(row.context.payload_kg - rows.front().context.payload_kg) < 1e-6;
   });
 }
 
 bool without_any_load(const std::vector<Observation>& rows) {
-  return std::all_of(rows.begin(), rows.end(), [](const Observation& row) {
+  return std::ranges::all_of(rows, [](const Observation& row) {
     const auto& f = row.context.force_n;
     return row.context.payload_kg == 0 && f[0] == 0 && f[1] == 0 && f[2] == 0;
   });
@@ -180,7 +180,7 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
   }
   std::vector<std::size_t> possible_order;
   for (const std::size_t c : order) {
-    if (std::binary_search(possible.kept.begin(), possible.kept.end(), c)) possible_order.push_back(c);
+    if (std::ranges::binary_search(possible.kept, c)) possible_order.push_back(c);
   }
   WeaknessTest test;
   test.data = data_matrix;
@@ -211,8 +211,8 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
     WeaknessTest selected;
     selected.data = data_matrix(Eigen::all, possible_order);
     selected.reference = test.reference(possible_order, possible_order);
-    selected.frames = static_cast<std::size_t>(std::count_if(possible_order.begin(), possible_order.end(),
-                                                             [&](std::size_t c) { return c < test.frames; }));
+    selected.frames = static_cast<std::size_t>(
+        std::ranges::count_if(possible_order, [&](std::size_t c) { return c < test.frames; }));
     out.suggested_poses = suggest_poses(selected, reference_matrix(Eigen::all, possible_order), reference);
   } else if (one_payload(rows) && rows.front().context.payload_kg > 0 && has_stiffness(all, start.set)) {
     out.payload_gains = second_payload_gains(reference, start, *model, out.fitted,

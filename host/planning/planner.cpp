@@ -28,7 +28,7 @@ using Speeds = std::array<double, joint_count>;
 /// Travel time, s, between joint positions at the joints' largest speeds; largest rotation, rad, where a speed
 /// is unknown.
 double distance(const Joints& a, const Joints& b, const Speeds& speed) {
-  const bool has_speeds = std::all_of(speed.begin(), speed.end(), [](double v) { return v > 0; });
+  const bool has_speeds = std::ranges::all_of(speed, [](double v) { return v > 0; });
   double longest = 0;
   for (std::size_t j = 0; j < joint_count; ++j) {
     longest = std::max(longest, std::abs(a[j] - b[j]) / (has_speeds ? speed[j] : 1));
@@ -163,7 +163,7 @@ std::vector<double> random_fitness(const PlanProblem& problem, std::size_t count
     out.push_back(exact.full_rank ? criterion.fitness(exact.figures)
                                   : std::numeric_limits<double>::infinity());
   }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return out;
 }
 
@@ -204,7 +204,7 @@ double path_length(const PoseSet& set, const Speeds& speed_rad_s) {
 PoseSet in_order_of_travel(const PlanProblem& problem, const PoseSet& set, const Speeds& speed_rad_s) {
   std::vector<std::size_t> payloads(problem.payloads.size());
   std::iota(payloads.begin(), payloads.end(), std::size_t{0});
-  std::stable_sort(payloads.begin(), payloads.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(payloads, [&](std::size_t a, std::size_t b) {
     return problem.payloads[a].payload_kg < problem.payloads[b].payload_kg;
   });
   PoseSet out;

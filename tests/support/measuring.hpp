@@ -45,8 +45,8 @@ struct Measuring {
   double noise = 1;  // times N1
   bool pose = true;
   std::vector<double> payload_kg{1.108};
-  Pose<double> f;
-  Pose<double> e;
+  Pose<double> f = {};
+  Pose<double> e = {};
 };
 
 inline Observation measure(const HostModel& model, const arms::Joints& q, std::size_t k, const Measuring& how,

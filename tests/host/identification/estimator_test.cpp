@@ -31,9 +31,7 @@ double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_P
 class Repeated : public ::testing::Test {
  protected:
   void prepare_poses(std::size_t count, const std::vector<double>& payloads, bool physical) {
-    Measuring how;
-    how.noise = 0;
-    how.payload_kg = payloads;
+    Measuring how{.noise = 0, .payload_kg = payloads};
     clean_ = measure(robot_, truth(), count, 77, how);
     const Identification exact =
         identify(robot_, clean_, "clean", {.physical = physical, .estimator = {.robust = false}});
@@ -99,7 +97,7 @@ TEST_F(Repeated, UnboundedEstimatesReachTheCramerRaoBoundAndTheirIntervalsAreRig
   const double ratio = variance.cwiseQuotient(cramer_rao()).mean();
   double pooled = 0;
   for (const int i : inside) pooled += i / n / 36;
-  const double least = *std::min_element(inside.begin(), inside.end()) / n;
+  const double least = *std::ranges::min_element(inside) / n;
   std::printf("95 %% intervals cover %.4f pooled, %.3f at least; variance / Cramer-Rao %.4f in the mean\n",
               pooled, least, ratio);
   EXPECT_GE(pooled, 0.94);
@@ -152,13 +150,13 @@ TEST_F(Repeated, TheBoundedMinimumIsTheBestOfAllChoices) {
   int several = 0;
   for (std::uint64_t k = 0; k < 20; ++k) {
     const Fit f = draw(5000 + k, options);
-    several += std::count(f.at_bound.begin(), f.at_bound.end(), true) >= 2 ? 1 : 0;
+    several += std::ranges::count(f.at_bound, true) >= 2 ? 1 : 0;
     double best = 1e300;
     const Unknowns all = unknowns_;
     for (unsigned mask = 0; mask < 32; ++mask) {
       unknowns_ = Unknowns();
       for (std::size_t p = 0; p < 36; ++p) {
-        const auto place = std::find(bounded.begin(), bounded.end(), p);
+        const auto place = std::ranges::find(bounded, p);
         if (place != bounded.end() && (mask >> (place - bounded.begin()) & 1U) != 0) continue;
         unknowns_.parameters.push_back(all.parameters[p]);
       }
@@ -282,8 +280,7 @@ TEST(Tolerances, APatternThatNamesNothingIsRefusedWithItsLine) {
 
 TEST(Payloads, NoneAtAllIsAnsweredWithPosesThatHaveOne) {
   const Robot robot = tx60l();
-  Measuring how;
-  how.payload_kg = {0};
+  Measuring how{.payload_kg = {0}};
   auto rows = measure(robot, truth(), 40, 3, how);
   const Identification r = identify(robot, rows, "data", {});
   EXPECT_EQ(r.identifiability.missing.size(), 5U);
@@ -315,8 +312,7 @@ TEST(Payloads, OneIsAnsweredWithWhatASecondWouldGain) {
   EXPECT_TRUE(two.identifiability.payload_gains.empty());
   for (const PayloadGain& gain : one.identifiability.payload_gains) {
     const auto& parameters = two.identifiability.fitted.parameters;
-    const auto p = std::find_if(parameters.begin(), parameters.end(),
-                                [&](const Parameter& q) { return q.name == gain.parameter; });
+    const auto p = std::ranges::find(parameters, gain.parameter, &Parameter::name);
     const Eigen::Index i = p - parameters.begin();
     const double sigma = std::sqrt(two.fit.covariance(i, i)) * unit_of(*p, two.fit.estimate.set);
     EXPECT_NEAR(gain.sigma_with_both / sigma, 1, 0.3) << gain.parameter << ": what was promised came";

@@ -95,7 +95,7 @@ TEST(ModelSizes, ACentreOfMassOnAxis6LosesItsCompliance) {
   const Robot robot = file_of(with_centre_of_mass_on_axis_6(arms::tx60l()));
   const Sizes s = sizes(robot, ModelKind::full, Measured::pose, 100, 4);
   EXPECT_EQ(s.identifiable, 35U);
-  EXPECT_TRUE(std::count(s.lost.begin(), s.lost.end(), "joint_compliance[joint=6].rad_per_nm"));
+  EXPECT_TRUE(std::ranges::count(s.lost, "joint_compliance[joint=6].rad_per_nm"));
   EXPECT_EQ(sizes(robot, ModelKind::geometric, Measured::pose, 100, 4).identifiable, 28U);
 }
 
@@ -116,7 +116,7 @@ TEST(ModelSizes, PositionsAtTheFlangeKnow24AndSevenOfTheFlexible) {
     const Robot robot = file_of(with_tool(arms::tx60l(), 0, 0, 0));
     const Sizes s = sizes(robot, ModelKind::full, Measured::position, poses, 6);
     EXPECT_EQ(s.identifiable, 31U);
-    EXPECT_TRUE(std::count(s.lost.begin(), s.lost.end(), "joint_compliance[joint=6].rad_per_nm"));
+    EXPECT_TRUE(std::ranges::count(s.lost, "joint_compliance[joint=6].rad_per_nm"));
     EXPECT_EQ(sizes(robot, ModelKind::geometric, Measured::position, poses, 6).identifiable, 24U);
   }
 }

@@ -27,8 +27,7 @@ ErrorStatistics held_out(const Robot& robot, const Calibration& c, const std::ve
 
 TEST(Identify, NoiseFreePosesGiveThePapersErrorsBack) {
   const Robot robot = tx60l();
-  Measuring how;
-  how.noise = 0;
+  Measuring how{.noise = 0};
   const Identification r =
       identify(robot, measure(robot, truth(), 40, 1, how), "data", plain_least_squares());
   EXPECT_EQ(r.parameters, 39U);
@@ -89,8 +88,7 @@ TEST(Identify, EveryStepLengthOfThePaperConverges) {
 TEST(Identify, UncertaintyIsRight) {
   const Robot robot = tx60l();
   const std::map<std::string, double> true_value = lumped_truth(robot);
-  Measuring how;
-  how.payload_kg = {0, 3};
+  Measuring how{.payload_kg = {0, 3}};
   int inside = 0;
   int all = 0;
   double squares = 0;
@@ -121,7 +119,7 @@ TEST(Identify, OutliersLoseTheirPullAndAreNamed) {
   rows[44].R = rotation_of({0.02, 0, 0}) * rows[44].R;
   const Identification r = identify(robot, rows, "data", {});
   for (const std::size_t k : {7U, 31U, 44U}) {
-    EXPECT_TRUE(std::count(r.outliers.begin(), r.outliers.end(), k)) << k;
+    EXPECT_TRUE(std::ranges::count(r.outliers, k)) << k;
   }
   EXPECT_LE(r.outliers.size(), 5U);
   EXPECT_LT(held_out(robot, r.calibration, others).mean_m, 1.1 * clean);

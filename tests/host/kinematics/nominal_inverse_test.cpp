@@ -43,7 +43,7 @@ TEST(NominalInverses, TheWayByWhichThePoseWasMadeIsAmongThem) {
       const Pose<double> pose = nominal_forward(model, q);
       const auto all = nominal_inverses(robot.nominal, pose);
       ways += all.size();
-      const bool there = std::any_of(all.begin(), all.end(), [&q](const auto& other) {
+      const bool there = std::ranges::any_of(all, [&q](const auto& other) {
         double most = 0;
         for (std::size_t j = 0; j < joint_count; ++j) most = std::max(most, std::abs(q[j] - other[j]));
         return most < 1e-5;

@@ -61,8 +61,7 @@ TEST(Models, RowsLeftOutAreThoseOfAFitWithoutThem) {
 
 TEST(Models, OfPositionsTooAndWithUnknownFrames) {
   const Robot robot = tx60l();
-  Measuring how;
-  how.pose = false;
+  Measuring how{.pose = false};
   const std::vector<Observation> rows = measure(robot, truth(), 40, 5, how);
   IdentifyOptions options = plain_least_squares();
   options.frames = FrameChoice::fit;
