@@ -4,6 +4,7 @@
 #ifndef FLEXCOMP_HOST_JSON_HPP
 #define FLEXCOMP_HOST_JSON_HPP
 
+#include <functional>
 #include <nlohmann/json.hpp>
 
 extern template class nlohmann::basic_json<nlohmann::ordered_map>;
@@ -11,6 +12,14 @@ extern template class nlohmann::basic_json<nlohmann::ordered_map>;
 namespace flexcomp::host {
 
 using Json = nlohmann::ordered_json;
+
+/// What `of` (a function or a member) makes of each element of a list.
+template <class List, class Of>
+Json json_list(const List& list, const Of& of) {
+  Json out = Json::array();
+  for (const auto& element : list) out.push_back(std::invoke(of, element));
+  return out;
+}
 
 }  // namespace flexcomp::host
 

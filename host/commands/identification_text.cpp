@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "commands/colour.hpp"
-#include "identification/fitted_parameters.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {

@@ -17,7 +17,7 @@
 #include "files/robot_file.hpp"
 #include "json.hpp"
 #include "planning/plan_json.hpp"
-#include "report/plan_page.hpp"
+#include "report/results.hpp"
 
 namespace flexcomp::host {
 namespace {

@@ -12,7 +12,6 @@
 #include "files/write_file.hpp"
 #include "input_error.hpp"
 #include "json.hpp"
-#include "report/parameters.hpp"
 #include "report/results.hpp"
 #include "report/stored_results.hpp"
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "diagnosis/bump_functions.hpp"
+// Unnamed functions that are concentrated near one pair of joint readings (D10).
 
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/smooth_functions.hpp"
 #include "diagnosis/spline.hpp"
 
 namespace flexcomp::host {
@@ -134,13 +135,11 @@ std::vector<SmoothFunction> bump_functions(const GapSystem& system, const Residu
         for (std::size_t w = 0; w < grids[a].size(); ++w) scan.search(grids[a][w], grids[b][w]);
         scan.refine(of[a].value, of[b].value);
         if (!scan.best) continue;
-        SmoothFunction found;
-        found.place = {static_cast<std::uint8_t>(j), slot::theta};
-        found.of = {a, b};
-        found.size_rad = 1e-4;
-        found.bump = scan.best;
-        found.gain = scan.gain;
-        all.push_back(std::move(found));
+        all.push_back({.place = {static_cast<std::uint8_t>(j), slot::theta},
+                       .of = {a, b},
+                       .size_rad = 1e-4,
+                       .bump = scan.best,
+                       .gain = scan.gain});
       }
     }
   }

@@ -44,28 +44,16 @@ constexpr std::array<double, 3> smooth_sizes_rad{5e-5, 1.5e-4, 5e-4};
 std::vector<std::string> lacking(const EffectDescriptor& d, const Testable& can,
                                  const ContextColumns& columns) {
   std::vector<std::string> needs;
-  switch (d.needs) {
-    case Needs::poses:
-      break;
-    case Needs::load:
-      if (!can.payload) needs = {"payload_kg"};
-      break;
-    case Needs::direction:
-      for (unsigned j = 1; j <= joint_count; ++j) {
-        if (!can.direction[j - 1]) needs.push_back("dir" + std::to_string(j));
-      }
-      break;
-    case Needs::moves:
-      for (unsigned j = 1; j <= joint_count && !can.relative_speed; ++j) {
-        if (!columns.move[j - 1]) needs.push_back("move" + std::to_string(j) + "_deg");
-      }
-      break;
-    case Needs::temperature:
-      if (!can.temperature) needs = {"temp_c"};
-      break;
-    case Needs::time:
-      if (!can.time) needs = {"time_s"};
-      break;
+  const auto need = [&needs](bool there, const std::string& column) {
+    if (!there) needs.push_back(column);
+  };
+  if (d.needs == Needs::load) need(can.payload, "payload_kg");
+  if (d.needs == Needs::temperature) need(can.temperature, "temp_c");
+  if (d.needs == Needs::time) need(can.time, "time_s");
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    const std::string joint = std::to_string(j + 1);
+    if (d.needs == Needs::direction) need(can.direction[j], "dir" + joint);
+    if (d.needs == Needs::moves) need(can.relative_speed || columns.move[j], "move" + joint + "_deg");
   }
   return needs;
 }
@@ -139,7 +127,7 @@ std::vector<EffectId> ids_of(const EffectDescriptor& d, const Robot& robot, std:
 
 Testable testable(const std::vector<Observation>& rows, const ContextColumns& columns) {
   Testable t;
-  t.payload = std::any_of(rows.begin(), rows.end(), [](const Observation& r) {
+  t.payload = std::ranges::any_of(rows, [](const Observation& r) {
     const auto& f = r.context.force_n;
     return r.context.payload_kg != 0 || f[0] != 0 || f[1] != 0 || f[2] != 0;
   });
@@ -172,8 +160,7 @@ CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows
     for (const EffectId& id : ids_of(d, robot, rows.size())) {
       const bool is_testable = d.needs == Needs::direction ? can.direction[id.joint - 1] : needs.empty();
       if (!is_testable || validation_error(id, robot.nominal) ||
-          std::any_of(present.begin(), present.end(),
-                      [&](const EffectGroup& group) { return same_name(group.id, id); }))
+          std::ranges::any_of(present, [&](const EffectGroup& group) { return same_name(group.id, id); }))
         continue;
       Candidate c;
       c.id = id;

@@ -9,7 +9,7 @@
 
 #include "diagnosis/discriminating_poses.hpp"
 #include "diagnosis/found_effects.hpp"
-#include "diagnosis/scatter_alternative.hpp"
+#include "diagnosis/scatter.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/identify.hpp"
 
@@ -21,10 +21,7 @@ namespace {
 FittedModel starting_model(const Robot& robot, const std::vector<Observation>& rows,
                            const std::string& source, const DiagnoseOptions& options, Diagnosis& out) {
   if (options.start) return fit_calibration(*options.start, robot, rows, options.seed);
-  IdentifyOptions identify_options;
-  identify_options.force = options.force;
-  identify_options.seed = options.seed;
-  Identification base = identify(robot, rows, source, identify_options);
+  Identification base = identify(robot, rows, source, {.force = options.force, .seed = options.seed});
   for (const std::string& d : base.doubts) out.doubts.push_back("the model at the start: " + d);
   out.before.confounded = base.calibration.confounded;
   return {std::move(base.fit), std::move(base.identifiability.fitted)};
@@ -142,7 +139,7 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   const ResidualAnalysis left = residual_after(*found.search, found.solution);
   out.places_left = scatters ? place_shares_at(refit, robot, rows) : place_shares(*found.system, left);
   const LeftOutPoses left_out(rows);
-  out.effects = found_effects(robot, selection, PermutationNull(*found.search, left, options.seed), left_out);
+  out.effects = found_effects(robot, selection, left, left_out, options.seed);
   out.steps = steps_of(selection, out.effects, left_out);
   out.not_testable = selection.search->not_testable();
   out.dropped = found.system->dropped;

@@ -16,12 +16,11 @@
 /// | smooth_functions, bump_functions | unnamed functions of one or two covariates, their relevant members | D9, D10, D11 (Tipping 2001) |
 /// | cross_validation | leave-one-pose-out prediction, pruning | D12 (Allen 1974) |
 /// | hypothesis, scanned_blocks | what a search selects; blocks that scans add | |
-/// | fitted_model, smooth_table, refit | nonlinear fit with the selected hypotheses | D16; docs/model.md, M34 to M40 |
-/// | outlier_hypotheses, lack_of_fit | outliers or structure; whether a misfit is left | D13, D14 |
-/// | effect_search | the search: selection, pruning, outliers, lack of fit | |
-/// | search_and_refit | search and refit in turns until the effects stay | |
-/// | scatter, scatter_alternative | places that scatter from pose to pose, as the alternative | D15 |
-/// | permutation_null, found_effects | p-values, confounded effects, sizes | D17 |
+/// | smooth_table, refit | nonlinear fit with the selected hypotheses | D16; docs/model.md, M34 to M40 |
+/// | outlier_hypotheses | outliers or structure | D13 |
+/// | effect_search | the search: selection, pruning, outliers, lack of fit; search and refit in turns | D14 |
+/// | scatter | places that scatter from pose to pose, as the alternative | D15 |
+/// | found_effects | p-values, confounded effects, sizes | D17 |
 /// | discriminating_poses | poses that separate confounded effects | D18 (Atkinson and Fedorov 1975) |
 ///
 /// Readers of the result: messages, effect_profile, held_out.

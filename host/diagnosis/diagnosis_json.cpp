@@ -80,12 +80,11 @@ Json effect_json(const FoundEffect& e) {
   j["p_value"] = e.p_value;
   j["delta_bic"] = e.delta_bic;
   j["pushed"] = e.pushed;
-  j["confounded_with"] = Json::array();
-  for (const Rival& r : e.confounded_with) {
+  j["confounded_with"] = json_list(e.confounded_with, [](const Rival& r) {
     Json rival = id_json(r.id);
     rival["delta_bic"] = r.delta_bic;
-    j["confounded_with"].push_back(rival);
-  }
+    return rival;
+  });
   j["cross_validation"] = e.cross_validation;
   j["largest_mm"] = e.largest_m * 1e3;
   j["rms_mm"] = e.rms_m * 1e3;
@@ -112,51 +111,41 @@ Json gap_json(const ErrorStatistics& train, const ErrorStatistics* holdout) {
 }
 
 Json places_json(const std::vector<PlaceShare>& places) {
-  Json list = Json::array();
-  for (const PlaceShare& p : places)
-    list.push_back({{"place", place_name(p.place)}, {"explains", p.explains}, {"p_value", p.p_value}});
-  return list;
+  return json_list(places, [](const PlaceShare& p) -> Json {
+    return {{"place", place_name(p.place)}, {"explains", p.explains}, {"p_value", p.p_value}};
+  });
 }
 
 }  // namespace
 
 Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std::optional<HeldOut>& holdout,
              const Robot& robot) {
-  Json j{{"verdict", word(d.verdict)}, {"effects", Json::array()}, {"not_testable", Json::array()}};
-  for (const FoundEffect& e : d.effects) j["effects"].push_back(effect_json(e));
-  for (const NotTestable& n : d.not_testable)
-    j["not_testable"].push_back({{"effect", effect_name(n.effect)}, {"needs", n.needs}});
+  Json j{{"verdict", word(d.verdict)}, {"effects", json_list(d.effects, effect_json)}};
+  j["not_testable"] = json_list(d.not_testable, [](const NotTestable& n) -> Json {
+    return {{"effect", effect_name(n.effect)}, {"needs", n.needs}};
+  });
   j["where"] = where_json(d.where);
   j["gap"] = {{"before", gap_json(d.error_before, holdout ? &holdout->before : nullptr)},
               {"after", gap_json(d.error_after, holdout ? &holdout->after : nullptr)},
               {"noise_floor_mm", d.noise_floor_m * 1e3},
               {"holdout_noise_floor_mm", holdout ? Json(holdout->noise_floor_m * 1e3) : Json()}};
-  j["unnamed"] = Json::array();
-  for (const EffectId& id : unnamed_effects(d, robot)) j["unnamed"].push_back(id_json(id));
+  j["unnamed"] = json_list(unnamed_effects(d, robot), id_json);
   j["poses"] = rows.size();
   j["chi2_per_dof"] = {{"before", d.chi2_per_dof_before}, {"after", d.chi2_per_dof_after}};
   j["degrees_of_freedom"] = d.degrees_of_freedom_after;
-  j["steps"] = Json::array();
-  for (const DiagnosisStep& s : d.steps) {
-    j["steps"].push_back({{"what", s.what},
-                          {"train_rms_mm", s.train_rms_m * 1e3},
-                          {"chi2_per_dof", s.chi2_per_dof},
-                          {"cross_validated", s.cross_validated}});
-  }
+  j["steps"] = json_list(d.steps, [](const DiagnosisStep& s) -> Json {
+    return {{"what", s.what},
+            {"train_rms_mm", s.train_rms_m * 1e3},
+            {"chi2_per_dof", s.chi2_per_dof},
+            {"cross_validated", s.cross_validated}};
+  });
   j["places"] = places_json(d.places);
   j["places_left"] = places_json(d.places_left);
-  j["dropped"] = Json::array();
-  for (const EffectId& id : d.dropped) j["dropped"].push_back(name(id));
-  j["telling_deg"] = Json::array();
-  j["telling_payload_kg"] = Json::array();
-  for (const SuggestedPose& p : d.discriminating_poses) {
-    Json pose = Json::array();
-    for (const double q : p.q_rad) pose.push_back(degrees(q));
-    j["telling_deg"].push_back(pose);
-    j["telling_payload_kg"].push_back(p.payload_kg);
-  }
-  j["outliers"] = Json::array();
-  for (const std::size_t k : d.outliers) j["outliers"].push_back(rows[k].line);
+  j["dropped"] = json_list(d.dropped, name);
+  j["telling_deg"] =
+      json_list(d.discriminating_poses, [](const SuggestedPose& p) { return json_list(p.q_rad, degrees); });
+  j["telling_payload_kg"] = json_list(d.discriminating_poses, &SuggestedPose::payload_kg);
+  j["outliers"] = json_list(d.outliers, [&](std::size_t k) { return rows[k].line; });
   j["notes"] = d.notes;
   j["doubts"] = d.doubts;
   return j;

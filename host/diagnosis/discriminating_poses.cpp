@@ -43,8 +43,8 @@ std::vector<Pair> pairs_of(const Robot& robot, const std::vector<Observation>& r
   };
   std::vector<Pair> pairs;
   for (const FoundEffect& effect : effects) {
-    const auto h = std::find_if(hypotheses.begin(), hypotheses.end(),
-                                [&](const Hypothesis& p) { return same_name(p.id, effect.id); });
+    const auto h =
+        std::ranges::find_if(hypotheses, [&](const Hypothesis& p) { return same_name(p.id, effect.id); });
     if (h == hypotheses.end() || h->parameters.empty()) continue;
     Eigen::VectorXd value = h->value;
     for (Eigen::Index k = 0; k < value.size(); ++k)
@@ -81,8 +81,7 @@ std::vector<SuggestedPose> discriminating_poses(const Robot& robot, const std::v
   constexpr std::size_t offered = 400;
   constexpr std::size_t most = 20;
   std::vector<SuggestedPose> chosen;
-  if (std::all_of(effects.begin(), effects.end(),
-                  [](const FoundEffect& e) { return e.confounded_with.empty(); }))
+  if (std::ranges::all_of(effects, [](const FoundEffect& e) { return e.confounded_with.empty(); }))
     return chosen;
   const std::vector<Observation> offers = random_observations(robot, rows, offered, seed);
   std::vector<Observation> all = rows;

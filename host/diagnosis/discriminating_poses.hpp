@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "diagnosis/candidates.hpp"
-#include "diagnosis/fitted_model.hpp"
-#include "diagnosis/hypothesis.hpp"
+#include "diagnosis/refit.hpp"
 
 namespace flexcomp::host {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "flexcomp/identification.hpp"
-#include "identification/residuals.hpp"
+#include "identification/fitted_calibration.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -98,14 +98,11 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
   const auto what = abscissa(id, robot.nominal);
   if (!what || rows.empty()) return std::nullopt;
   const auto groups = effects_of(calibration.terms, robot.nominal);
-  const auto group = std::find_if(groups.begin(), groups.end(),
-                                  [&](const EffectGroup& g) { return name(g.id) == name(id); });
+  const auto group =
+      std::ranges::find_if(groups, [&](const EffectGroup& g) { return name(g.id) == name(id); });
   if (group == groups.end()) return std::nullopt;
 
-  Estimate with;
-  with.set = calibration.terms;
-  with.f = calibration.f();
-  with.e = calibration.e();
+  Estimate with = estimate_of(calibration);
   Unknowns unknowns;
   unknowns.parameters.push_back(add_turn(with.set, {static_cast<std::uint8_t>(id.joint), slot::theta}));
   unknowns.parameters.insert(unknowns.parameters.end(), group->parameters.begin(), group->parameters.end());
@@ -135,9 +132,8 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
   // The line: over all angles that were measured, or where the rows are.
   std::vector<Observation> places = rows;
   if (what->kind == Abscissa::Kind::reading) {
-    const auto [low, high] = std::minmax_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) {
-      return a.q_rad[what->joint] < b.q_rad[what->joint];
-    });
+    const auto [low, high] = std::ranges::minmax_element(
+        rows, [&](const auto& a, const auto& b) { return a.q_rad[what->joint] < b.q_rad[what->joint]; });
     const double from = low->q_rad[what->joint], to = high->q_rad[what->joint];
     places.assign(line_points, rows.front());
     for (std::size_t k = 0; k < line_points; ++k) {
@@ -155,7 +151,7 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
     Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(group->parameters.size()),
                                                    calibration.covariance->factor.cols());
     for (std::size_t p = 0; p < group->parameters.size(); ++p) {
-      const auto at = std::find(known.begin(), known.end(), group->parameters[p].name);
+      const auto at = std::ranges::find(known, group->parameters[p].name);
       if (at != known.end())
         factor.row(static_cast<Eigen::Index>(p)) = calibration.covariance->factor.row(at - known.begin());
     }
@@ -183,7 +179,7 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
           std::sqrt(std::max(0.0, (slope * covariance * slope.transpose()).value()));
     }
   }
-  std::sort(out.line.begin(), out.line.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
+  std::ranges::sort(out.line, [](const auto& a, const auto& b) { return a.x < b.x; });
   return out;
 }
 

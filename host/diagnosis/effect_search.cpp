@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/bump_functions.hpp"
-#include "diagnosis/lack_of_fit.hpp"
 #include "diagnosis/outlier_hypotheses.hpp"
 #include "measurement/repeats.hpp"
 
@@ -28,15 +26,66 @@ double noise_scale2_of(const std::vector<Observation>& rows, std::vector<std::st
   return pure->chi2_per_dof_whitened;
 }
 
-}  // namespace
+/// Misfit that one unnamed function of the solution explains. \param left  residual of the whole solution
+Misfit misfit_of_function(const SearchResult& found, std::size_t hypothesis, const ResidualAnalysis& left) {
+  const SmoothFunction& function = *found.hypotheses[hypothesis].function;
+  Misfit m;
+  m.place = function.place;
+  m.joint = function.place.body;
+  for (std::size_t k = 0; k < function.of.size(); ++k) {
+    m.covariates.push_back(found.variables[function.of[k]].name());
+    m.around_deg.emplace_back();
+    if (function.bump) m.around_deg.back() = degrees(function.bump->centre_rad[k]);
+  }
+  const Scored less = found.search->score(without(found.solution.blocks, found.solution.blocks[hypothesis]));
+  const ResidualAnalysis before = residual_after(*found.search, less);
+  m.explains = before.chi2() > 0 ? 1 - left.chi2() / before.chi2() : 0;
+  m.p_value = std::exp(-0.5 * std::max(0.0, found.solution.gain - less.gain));
+  return m;
+}
 
+/// Sets `unnamed` and `misfit`: of the largest unnamed function that was selected, else of a residual whose chi-square or
+/// share at one place is beyond chance (D14).
+void test_lack_of_fit(SearchResult& found) {
+  const ResidualAnalysis left = residual_after(*found.search, found.solution);
+  for (std::size_t h = 0; h < found.hypotheses.size(); ++h) {
+    if (!found.hypotheses[h].function) continue;
+    found.unnamed = true;
+    const Misfit m = misfit_of_function(found, h, left);
+    if (!found.misfit || m.explains > found.misfit->explains) found.misfit = m;
+  }
+  if (found.unnamed) return;
+  const double dof = found.system->numbers - left.fitted_numbers;
+  const std::vector<PlaceShare> places = place_shares(*found.system, left);
+  const auto worst = std::ranges::min_element(places, {}, &PlaceShare::p_value);
+  const bool too_large = dof >= 1 && left.chi2() > chi2_quantile(0.9995, dof);
+  // One of some fifty places, at one in a thousand.
+  const bool at_a_place = worst != places.end() && worst->p_value < 1e-3 / 50;
+  if (!too_large && !at_a_place) return;
+  found.unnamed = true;
+  Misfit m;
+  if (worst != places.end()) {
+    m.place = worst->place;
+    m.joint = joint_of(worst->place);
+    m.explains = worst->explains;
+    m.p_value = worst->p_value;
+  }
+  found.misfit = m;
+  found.notes.push_back(
+      "what is left follows nothing that was recorded: it looks like scatter from pose to pose, beyond the "
+      "declared noise");
+}
+
+/// Whether both name the same effects.
 bool same_effects(const SearchResult& a, const SearchResult& b) {
   return a.hypotheses.size() == b.hypotheses.size() && a.unnamed == b.unnamed &&
-         std::all_of(a.hypotheses.begin(), a.hypotheses.end(), [&](const Hypothesis& p) {
-           return std::any_of(b.hypotheses.begin(), b.hypotheses.end(),
-                              [&](const Hypothesis& q) { return same_name(p.id, q.id); });
+         std::ranges::all_of(a.hypotheses, [&](const Hypothesis& p) {
+           return std::ranges::any_of(b.hypotheses,
+                                      [&](const Hypothesis& q) { return same_name(p.id, q.id); });
          });
 }
+
+}  // namespace
 
 EffectSearch::EffectSearch(const Robot& robot, const std::vector<Observation>& rows,
                            const ContextColumns& columns, const FittedModel& start, bool poses_scatter)
@@ -216,6 +265,28 @@ SearchResult EffectSearch::run_again(const Refit& refit, const SearchResult& fou
     again.misfit = found.misfit;
   }
   return again;
+}
+
+Selection search_and_refit(const Robot& robot, const std::vector<Observation>& rows,
+                           const ContextColumns& columns, const FittedModel& start, bool poses_scatter,
+                           const DiagnosisProgress& progress, double done) {
+  Selection out;
+  out.rows = std::make_unique<const std::vector<Observation>>(rows);
+  out.start = start;
+  out.search = std::make_unique<const EffectSearch>(robot, *out.rows, columns, start, poses_scatter);
+  out.found = out.search->run(
+      [&](double share) { progress("searching the catalogue", done + (0.6 - done) * share); });
+  progress("the model with what was found", 0.6);
+  out.refit = refit_model(robot, *out.rows, start, out.found);
+  // Where the search was linear the refit is not: once more from there, until the effects stay.
+  for (int round = 0; round < 2 && !out.found.hypotheses.empty(); ++round) {
+    SearchResult again = out.search->run_again(out.refit, out.found);
+    const bool same = same_effects(out.found, again);
+    out.found = std::move(again);
+    if (same) break;
+    out.refit = refit_model(robot, *out.rows, start, out.found);
+  }
+  return out;
 }
 
 }  // namespace flexcomp::host

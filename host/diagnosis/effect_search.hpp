@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Search for the hypotheses that explain a misfit: blocks of the catalogue, scans and functions (D2 to D11), pruning on
-/// left-out poses (D12), rows that are outliers or structure (D13), lack of fit (D14).
+/// left-out poses (D12), rows that are outliers or structure (D13), lack of fit (D14). Search and nonlinear refit in turns,
+/// until the selected effects stay.
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_EFFECT_SEARCH_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_EFFECT_SEARCH_HPP
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "diagnosis/candidates.hpp"
 #include "diagnosis/cross_validation.hpp"
-#include "diagnosis/fitted_model.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "diagnosis/refit.hpp"
 #include "diagnosis/scanned_blocks.hpp"
@@ -60,8 +61,19 @@ class EffectSearch {
   std::size_t least_touched_;
 };
 
-/// Whether both name the same effects.
-bool same_effects(const SearchResult& a, const SearchResult& b);
+/// Converged search with its refit, on rows of a given noise.
+struct Selection {
+  std::unique_ptr<const std::vector<Observation>> rows;
+  FittedModel start;
+  std::unique_ptr<const EffectSearch> search;
+  SearchResult found;
+  Refit refit;
+};
+
+/// \param poses_scatter  as of EffectSearch \param done  share of the diagnosis that was done before
+Selection search_and_refit(const Robot& robot, const std::vector<Observation>& rows,
+                           const ContextColumns& columns, const FittedModel& start, bool poses_scatter,
+                           const DiagnosisProgress& progress, double done);
 
 }  // namespace flexcomp::host
 

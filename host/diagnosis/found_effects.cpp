@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
+#include "linalg/blas.hpp"
 #include "model/covariate.hpp"
 #include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
@@ -13,6 +15,80 @@
 namespace flexcomp::host {
 
 namespace {
+
+using Rows = std::vector<std::size_t>;
+
+/// The rows in an order without structure: every second permutation moves whole runs, which keeps drift within them.
+Rows permuted_order(const Rows& live, bool in_runs, std::mt19937_64& random) {
+  if (!in_runs) {
+    Rows order = live;
+    std::shuffle(order.begin(), order.end(), random);
+    return order;
+  }
+  const std::size_t run = std::max<std::size_t>(2, static_cast<std::size_t>(std::sqrt(double(live.size()))));
+  Rows order;
+  Rows starts;
+  const std::size_t shift = random() % live.size();
+  for (std::size_t s = 0; s < live.size(); s += run) starts.push_back(s);
+  std::shuffle(starts.begin(), starts.end(), random);
+  for (const std::size_t s : starts) {
+    for (std::size_t k = s; k < std::min(s + run, live.size()); ++k)
+      order.push_back(live[(k + shift) % live.size()]);
+  }
+  return order;
+}
+
+/// Null distribution of the largest gain in the whole catalogue, by permutation of the poses (D17).
+class PermutationNull {
+ public:
+  /// Permutes the poses of a residual, freely and in runs of consecutive ones in turn, and keeps of each permutation the
+  /// largest gain of one block alone.
+  PermutationNull(const SubsetSearch& search, const ResidualAnalysis& left, std::uint64_t seed);
+
+  /// Probability that chance gains as much anywhere in the catalogue; beyond the permutations by the Gumbel distribution
+  /// of their maxima (moments). 1 where the rows are too few.
+  double p_value(double gain) const;
+
+ private:
+  std::vector<double> maxima_;
+};
+
+PermutationNull::PermutationNull(const SubsetSearch& search, const ResidualAnalysis& left,
+                                 std::uint64_t seed) {
+  const GapSystem& system = search.system();
+  const std::size_t count = system.rows > many_rows ? 100 : 200;
+  std::mt19937_64 random(seed);
+  Rows live;
+  for (std::size_t k = 0; k < system.rows; ++k) {
+    if (system.counts[k]) live.push_back(k);
+  }
+  if (live.size() < 8) return;
+  Eigen::MatrixXd permuted = Eigen::MatrixXd::Zero(left.residual.size(), static_cast<Eigen::Index>(count));
+  for (std::size_t p = 0; p < count; ++p) {
+    const Rows order = permuted_order(live, p % 2 == 1, random);
+    for (std::size_t k = 0; k < live.size(); ++k) {
+      permuted.col(static_cast<Eigen::Index>(p)).segment<6>(first_number(live[k])) =
+          left.residual.segment<6>(first_number(order[k]));
+    }
+  }
+  permuted -= product(system.nuisance, transposed_product(system.nuisance, permuted));
+  const Eigen::VectorXd largest = search.largest_single_gains(permuted);
+  maxima_.assign(largest.data(), largest.data() + largest.size());
+}
+
+double PermutationNull::p_value(double gain) const {
+  if (maxima_.empty()) return 1;
+  const double n = static_cast<double>(maxima_.size());
+  const auto above = static_cast<double>(std::ranges::count_if(maxima_, [&](double m) { return m >= gain; }));
+  if (above >= 10) return (1 + above) / (1 + n);
+  double mean = 0;
+  double square = 0;
+  for (const double m : maxima_) mean += m / n;
+  for (const double m : maxima_) square += (m - mean) * (m - mean) / (n - 1);
+  const double beta = std::sqrt(6 * square) / pi;
+  const double mu = mean - 0.57721566490153286 * beta;
+  return -std::expm1(-std::exp(-(gain - mu) / std::max(beta, 1e-9)));
+}
 
 /// Coefficients, and how far the effect moves the measured point beyond what the model's other parts would absorb.
 /// \param nuisance  orthonormal basis of these, whitened as the rows are
@@ -70,15 +146,14 @@ std::vector<Rival> rivals_of(const SubsetSearch& search, const Scored& solution,
     // A rival is better than nothing.
     if (!(delta < decisive_bic) || !(gains[b] > 0)) continue;
     const auto known =
-        std::find_if(rivals.begin(), rivals.end(), [&](const Rival& r) { return same_name(r.id, block.id); });
+        std::ranges::find_if(rivals, [&](const Rival& r) { return same_name(r.id, block.id); });
     if (known == rivals.end()) {
       rivals.push_back({block.id, delta});
     } else if (delta < known->delta_bic) {
       *known = {block.id, delta};
     }
   }
-  std::sort(rivals.begin(), rivals.end(),
-            [](const Rival& a, const Rival& b) { return a.delta_bic < b.delta_bic; });
+  std::ranges::sort(rivals, {}, &Rival::delta_bic);
   return rivals;
 }
 
@@ -91,17 +166,17 @@ Subset without_effect(const SearchResult& found, const EffectId& id) {
 }  // namespace
 
 std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& selection,
-                                       const PermutationNull& chance, const LeftOutPoses& left_out) {
+                                       const ResidualAnalysis& left, const LeftOutPoses& left_out,
+                                       std::uint64_t seed) {
   const SearchResult& found = selection.found;
   const SubsetSearch& search = *found.search;
+  const PermutationNull chance(search, left, seed);
   const double all_cv = left_out.chi2_per_number(search, found.solution);
   std::vector<FoundEffect> effects;
   for (const Hypothesis& h : found.hypotheses) {
     if (h.function) continue;
     // A second local fault of the same curve is no other effect.
-    if (std::any_of(effects.begin(), effects.end(),
-                    [&](const FoundEffect& e) { return same_name(e.id, h.id); }))
-      continue;
+    if (std::ranges::any_of(effects, [&](const FoundEffect& e) { return same_name(e.id, h.id); })) continue;
     FoundEffect effect;
     effect.id = h.id;
     const Subset without = without_effect(found, h.id);
@@ -115,8 +190,7 @@ std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& sele
     describe(effect, selection.refit, robot, *selection.rows, found.system->nuisance);
     effects.push_back(std::move(effect));
   }
-  std::stable_sort(effects.begin(), effects.end(),
-                   [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic > b.delta_bic; });
+  std::ranges::stable_sort(effects, std::ranges::greater(), &FoundEffect::delta_bic);
   return effects;
 }
 

@@ -4,17 +4,19 @@
 #ifndef FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
 #define FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
 
+#include <cstdint>
 #include <vector>
 
-#include "diagnosis/permutation_null.hpp"
-#include "diagnosis/search_and_refit.hpp"
+#include "diagnosis/effect_search.hpp"
+#include "diagnosis/residual_analysis.hpp"
 
 namespace flexcomp::host {
 
 /// The effects of the catalogue in a selection, largest gain first.
+/// \param left  residual of the selection, which is permuted for the p-values \param seed  of the permutations
 std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& selection,
-                                       const PermutationNull& chance, const LeftOutPoses& left_out);
-
+                                       const ResidualAnalysis& left, const LeftOutPoses& left_out,
+                                       std::uint64_t seed);
 /// Errors of the start, and after each effect and unnamed function that is added in turn.
 std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vector<FoundEffect>& effects,
                                     const LeftOutPoses& left_out);

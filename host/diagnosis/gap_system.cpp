@@ -54,6 +54,45 @@ std::vector<Place> all_places() {
   return places;
 }
 
+/// Columns of the candidates (whitened), projected (D1) and sorted into blocks, one per form of an effect.
+void add_candidates(GapSystem& system, const CandidateSet& all, const Eigen::MatrixXd& columns) {
+  const Eigen::MatrixXd projected =
+      columns - product(system.nuisance, transposed_product(system.nuisance, columns));
+  // One column per parameter; forms of a name share them.
+  std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
+  const std::vector<Eigen::Index> kept = identifiable_columns(columns, projected);
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    column_of[static_cast<std::size_t>(kept[k])] = static_cast<Eigen::Index>(k);
+  system.columns = projected(Eigen::all, kept);
+  for (std::size_t c = 0; c < all.list.size(); ++c) {
+    const Candidate& candidate = all.list[c];
+    if (candidate.steps) continue;  // a scan makes blocks of it
+    Block block;
+    block.id = candidate.id;
+    block.candidate = c;
+    block.positive = candidate.positive;
+    for (const std::size_t p : candidate.parameters) {
+      if (column_of[p] < 0) continue;
+      block.columns.push_back(column_of[p]);
+      block.fitted.push_back(p);
+    }
+    if (block.columns.empty()) {
+      const bool known = std::ranges::any_of(system.dropped,
+                                             [&](const EffectId& id) { return same_name(id, candidate.id); });
+      if (!known) system.dropped.push_back(candidate.id);
+      continue;
+    }
+    block.parameters = rank(system.columns, block.columns, columns, kept);
+    // Every arm bends: what the paper's model has needs no more than its BIC.
+    block.margin = descriptor(block.id.effect).in_paper_model ? 0 : least_gain;
+    if (candidate.prior_rad > 0) {
+      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
+      block.parameters = 0;
+    }
+    system.blocks.push_back(std::move(block));
+  }
+}
+
 }  // namespace
 
 Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_row) {
@@ -85,49 +124,6 @@ void add_block(GapSystem& system, Block block, const Eigen::MatrixXd& columns) {
   }
   system.blocks.push_back(std::move(block));
 }
-
-namespace {
-
-/// Columns of the candidates (whitened), projected (D1) and sorted into blocks, one per form of an effect.
-void add_candidates(GapSystem& system, const CandidateSet& all, const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd projected =
-      columns - product(system.nuisance, transposed_product(system.nuisance, columns));
-  // One column per parameter; forms of a name share them.
-  std::vector<Eigen::Index> column_of(all.parameters.size(), -1);
-  const std::vector<Eigen::Index> kept = identifiable_columns(columns, projected);
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    column_of[static_cast<std::size_t>(kept[k])] = static_cast<Eigen::Index>(k);
-  system.columns = projected(Eigen::all, kept);
-  for (std::size_t c = 0; c < all.list.size(); ++c) {
-    const Candidate& candidate = all.list[c];
-    if (candidate.steps) continue;  // a scan makes blocks of it
-    Block block;
-    block.id = candidate.id;
-    block.candidate = c;
-    block.positive = candidate.positive;
-    for (const std::size_t p : candidate.parameters) {
-      if (column_of[p] < 0) continue;
-      block.columns.push_back(column_of[p]);
-      block.fitted.push_back(p);
-    }
-    if (block.columns.empty()) {
-      const bool known = std::any_of(system.dropped.begin(), system.dropped.end(),
-                                     [&](const EffectId& id) { return same_name(id, candidate.id); });
-      if (!known) system.dropped.push_back(candidate.id);
-      continue;
-    }
-    block.parameters = rank(system.columns, block.columns, columns, kept);
-    // Every arm bends: what the paper's model has needs no more than its BIC.
-    block.margin = descriptor(block.id.effect).in_paper_model ? 0 : least_gain;
-    if (candidate.prior_rad > 0) {
-      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
-      block.parameters = 0;
-    }
-    system.blocks.push_back(std::move(block));
-  }
-}
-
-}  // namespace
 
 GapSystem gap_system(const Robot& robot, const std::vector<Observation>& rows,
                      const std::vector<bool>& counts, const Estimate& estimate, const Unknowns& fitted,

@@ -86,7 +86,7 @@ std::vector<std::string> missing_columns(const MeasuredData& fitted, const Measu
   const std::vector<std::string> have = joint_and_context_names(other.columns);
   std::vector<std::string> missing;
   for (const std::string& name : joint_and_context_names(fitted.columns)) {
-    if (std::find(have.begin(), have.end(), name) == have.end()) missing.push_back(name);
+    if (std::ranges::find(have, name) == have.end()) missing.push_back(name);
   }
   return missing;
 }

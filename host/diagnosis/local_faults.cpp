@@ -28,7 +28,7 @@ std::optional<double> chi2_gain_at(double centre, double spacing, const PlacePro
   Eigen::VectorXd w = Eigen::VectorXd::Zero(s.basis.rows());
   // Rows inside the support, over the end of the turn as well.
   const auto visit = [&](double from, double to) {
-    for (auto at = std::lower_bound(order.begin(), order.end(), std::pair{from, Eigen::Index{-1}});
+    for (auto at = std::ranges::lower_bound(order, std::pair{from, Eigen::Index{-1}});
          at != order.end() && at->first < to; ++at) {
       const double phi = cardinal_spline(angle_difference(at->first, centre) / spacing);
       if (phi <= 0 || !(s.square[at->second] > 0)) continue;
@@ -69,7 +69,7 @@ std::vector<LocalCurve> local_curves(const GapSystem& system, const ResidualAnal
     Order order;
     for (std::size_t k = 0; k < rows.size(); ++k)
       order.emplace_back(angle_difference(rows[k].q_rad[joint - 1], 0), static_cast<Eigen::Index>(k));
-    std::sort(order.begin(), order.end());
+    std::ranges::sort(order);
     std::vector<LocalCurve> all;
     for (const std::size_t knots : {24U, 36U, 48U, 72U, 96U}) {
       const double spacing = 2 * pi / static_cast<double>(knots);
@@ -83,7 +83,7 @@ std::vector<LocalCurve> local_curves(const GapSystem& system, const ResidualAnal
     std::size_t taken = 0;
     for (const LocalCurve& c : all) {
       if (taken >= per_joint || !(c.gain > 0)) break;
-      const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const LocalCurve& other) {
+      const bool near = std::ranges::any_of(chosen, [&](const LocalCurve& other) {
         return other.joint == joint && std::abs(angle_difference(other.centre_rad, c.centre_rad)) <
                                            other.spacing_rad() + c.spacing_rad();
       });
@@ -102,8 +102,7 @@ std::vector<Slip> slips(const GapSystem& system, const ResidualAnalysis& left,
   std::vector<Eigen::Index> order(rows.size());
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   const auto time = [&](Eigen::Index k) { return rows[static_cast<std::size_t>(k)].context.time_s; };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return time(a) > time(b); });
+  std::ranges::stable_sort(order, [&](Eigen::Index a, Eigen::Index b) { return time(a) > time(b); });
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(left.basis.cols(), 3);

@@ -53,13 +53,10 @@ std::string curve_size(const KeyedCoefficients& c) {
     high = std::max(high, v.value);
     if (std::isfinite(v.sigma)) sigmas.push_back(v.sigma);  // of a local fault only those near it are fitted
   }
-  if (sigmas.empty()) sigmas.push_back(std::nan(""));
-  std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2),
-                   sigmas.end());
+  const double sigma = sigmas.empty() ? std::nan("") : median(sigmas);
   return fmt::format(
       "{}: {} of them between {:.3g} and {:.3g}, +- {:.2g}  ({:.3g} … {:.3g}, +- {:.2g} arcsec)", c.key,
-      c.values.size(), low, high, sigmas[sigmas.size() / 2], low * arcsec_per_rad, high * arcsec_per_rad,
-      sigmas[sigmas.size() / 2] * arcsec_per_rad);
+      c.values.size(), low, high, sigma, low * arcsec_per_rad, high * arcsec_per_rad, sigma * arcsec_per_rad);
 }
 
 }  // namespace

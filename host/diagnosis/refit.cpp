@@ -5,10 +5,10 @@
 #include <cmath>
 #include <map>
 
-#include "diagnosis/smooth_table.hpp"
 #include "diagnosis/spline.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/fitted_calibration.hpp"
+#include "identification/parameter_selection.hpp"
 #include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
@@ -28,7 +28,7 @@ struct CurveParts {
     if (whole) return true;
     const double at = 2 * pi * static_cast<double>(coefficient) / static_cast<double>(size);
     // All whose knot lies in the inner half of the spline's support.
-    return std::any_of(locals.begin(), locals.end(), [&](const LocalCurve* c) {
+    return std::ranges::any_of(locals, [&](const LocalCurve* c) {
       return std::abs(angle_difference(at, c->centre_rad)) < 1.5 * 2 * pi / static_cast<double>(c->knots);
     });
   }
@@ -102,7 +102,7 @@ ExtendedModel extended_model(const Robot& robot, const FittedModel& start, const
   for (const Hypothesis& h : found.hypotheses) {
     if (h.id.effect == Effect::joint_curve) continue;
     if (h.function) {
-      add_smooth_table(h, found.variables, robot, out.model);
+      add_smooth_table(*h.function, h.value, found.variables, robot, out.model);
     } else {
       out.add(h, robot);
     }
@@ -153,8 +153,7 @@ Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, cons
   Refit out;
   const Estimate& at = start.fit.estimate;
   ExtendedModel extended = extended_model(robot, start, found);
-  EstimatorOptions options;
-  options.spectrum = false;
+  EstimatorOptions options{.spectrum = false};
   // On the way to a curve's prior no more than near the minimum.
   if (!extended.curve_ranges.empty()) options.largest_iterations = 8;
   out.fit = fit({extended.model.set, at.f, at.e}, extended.fitted, rows, robot, options);
@@ -169,6 +168,26 @@ Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, cons
   }
   out.fitted = std::move(extended.fitted);
   out.calibration = fitted_calibration(out.fit, out.fitted, robot);
+  return out;
+}
+
+FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
+                            const std::vector<Observation>& rows, std::uint64_t seed) {
+  const Estimate estimate = estimate_of(calibration);
+  Unknowns all;
+  if (calibration.frames) all.frames = free_frames(rows);
+  const bool has_sigma = std::ranges::any_of(calibration.sigma, [](double s) { return std::isfinite(s); });
+  for (Parameter& p : parameters_of(calibration.terms, robot.nominal)) {
+    const std::vector<double>& sigma = p.value ? calibration.value_sigma : calibration.sigma;
+    const std::size_t at = p.value ? *p.value : p.terms.front();
+    const bool given = has_sigma && !(at < sigma.size() && std::isfinite(sigma[at]));
+    if (given || estimate.set.terms[p.terms.front()].effect == Effect::unnamed) continue;
+    all.parameters.push_back(std::move(p));
+  }
+  all.prior = prior_knowledge(estimate.set, all.parameters, true, {});
+  FittedModel out;
+  out.fitted = analyse_identifiability(robot, rows, estimate, all, seed).fitted;
+  out.fit = fit(estimate, out.fitted, rows, robot, {});
   return out;
 }
 

@@ -6,12 +6,22 @@
 
 #include <vector>
 
-#include "diagnosis/fitted_model.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "identification/estimator.hpp"
 #include "model/calibration.hpp"
 
 namespace flexcomp::host {
+
+/// A fitted model and the unknowns that these rows determine (docs/model.md, M33).
+struct FittedModel {
+  Fit fit;
+  Unknowns fitted;
+};
+
+/// Fits a calibration's own parameters again. What it was given and did not fit stays fixed; an effect `unnamed` too, so
+/// that its cause is searched anew.
+FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
+                            const std::vector<Observation>& rows, std::uint64_t seed);
 
 /// The start's parameters and the effects'.
 struct Refit : FittedModel {

@@ -81,8 +81,7 @@ std::vector<PlaceShare> place_shares(const GapSystem& system, const ResidualAnal
     share.explains = beyond > 0 ? std::clamp((found - expected) / beyond, 0.0, 1.0) : 0;
     shares.push_back(share);
   }
-  std::stable_sort(shares.begin(), shares.end(),
-                   [](const PlaceShare& a, const PlaceShare& b) { return a.explains > b.explains; });
+  std::ranges::stable_sort(shares, std::ranges::greater(), &PlaceShare::explains);
   return shares;
 }
 

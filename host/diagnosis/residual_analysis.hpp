@@ -43,7 +43,7 @@ std::vector<PlaceShare> place_shares(const GapSystem& system, const ResidualAnal
 /// Sorts what a scan found by gain and keeps the best.
 template <class Found>
 void keep_best(std::vector<Found>& all, std::size_t most) {
-  std::sort(all.begin(), all.end(), [](const Found& a, const Found& b) { return a.gain > b.gain; });
+  std::ranges::sort(all, std::ranges::greater(), &Found::gain);
   if (all.size() > most) all.resize(most);
 }
 

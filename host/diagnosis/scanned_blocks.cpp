@@ -22,8 +22,7 @@ constexpr double curve_unit_rad = 1e-4;
 std::optional<SlipColumns> slip_columns(const Robot& robot, const std::vector<Observation>& rows,
                                         const std::vector<bool>& counts, const Estimate& at,
                                         const CandidateSet& candidates) {
-  const auto slip = std::find_if(candidates.list.begin(), candidates.list.end(),
-                                 [](const Candidate& c) { return c.steps; });
+  const auto slip = std::ranges::find_if(candidates.list, &Candidate::steps);
   if (slip == candidates.list.end()) return {};
   SlipColumns out;
   out.id = slip->id;
@@ -44,7 +43,7 @@ std::optional<SlipColumns> slip_columns(const Robot& robot, const std::vector<Ob
 
 void ScannedBlocks::add_local_faults(const std::vector<LocalCurve>& fresh) {
   for (const LocalCurve& c : fresh) {
-    const bool there = std::any_of(locals_.begin(), locals_.end(), [&](const LocalCurve& o) {
+    const bool there = std::ranges::any_of(locals_, [&](const LocalCurve& o) {
       return o.joint == c.joint && o.knots == c.knots && std::abs(o.centre_rad - c.centre_rad) < 1e-9;
     });
     if (there) continue;
@@ -76,9 +75,8 @@ void ScannedBlocks::add_local_faults(const std::vector<LocalCurve>& fresh) {
 
 void ScannedBlocks::add_slips(const std::vector<Slip>& found) {
   for (const Slip& slip : found) {
-    const bool there = std::any_of(system_.blocks.begin(), system_.blocks.end(), [&](const Block& b) {
-      return is_step(b.id) && b.id.after_s == slip.after_s;
-    });
+    const bool there = std::ranges::any_of(
+        system_.blocks, [&](const Block& b) { return is_step(b.id) && b.id.after_s == slip.after_s; });
     if (there) continue;
     Eigen::VectorXd step(static_cast<Eigen::Index>(rows_.size()));
     for (std::size_t k = 0; k < rows_.size(); ++k)
@@ -130,7 +128,7 @@ bool ScannedBlocks::add_function(const SmoothFunction& f, double cost) {
 
 void ScannedBlocks::add_functions(const std::vector<SmoothFunction>& fresh, double cost) {
   for (const SmoothFunction& f : fresh) {
-    const bool there = std::any_of(functions_.begin(), functions_.end(), [&](const SmoothFunction& o) {
+    const bool there = std::ranges::any_of(functions_, [&](const SmoothFunction& o) {
       return o.place == f.place && o.of == f.of && o.size_rad == f.size_rad && !o.bump && !f.bump;
     });
     if (!there) add_function(f, cost);

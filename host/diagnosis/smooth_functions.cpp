@@ -67,7 +67,7 @@ Eigen::MatrixXd members_of_one(const Variable& range, const Eigen::VectorXd& at,
   if (range.kind == Covariate::direction) return x.matrix();
   // Few values of a payload determine few powers.
   std::vector<double> distinct(range.value.data(), range.value.data() + range.value.size());
-  std::sort(distinct.begin(), distinct.end());
+  std::ranges::sort(distinct);
   distinct.erase(std::unique(distinct.begin(), distinct.end(),
                              [&](double a, double b) { return b - a < 1e-6 * (high - low); }),
                  distinct.end());

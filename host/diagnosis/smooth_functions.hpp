@@ -38,11 +38,11 @@ struct Bump {
 /// A smooth function of one or two variables that turns a joint: coefficients of members with a normal prior.
 struct SmoothFunction {
   Place place;
-  std::vector<std::size_t> of;  ///< indices of variables, one or two
-  double size_rad = 0;          ///< prior standard deviation of a coefficient
-  std::optional<Bump> bump;     ///< then it has this one member
-  int harmonics = 2;            ///< of each joint reading, in products
-  Eigen::VectorXd share;        ///< of the size, per member; members of 0 are left out; empty: all of it
+  std::vector<std::size_t> of = {};  ///< indices of variables, one or two
+  double size_rad = 0;               ///< prior standard deviation of a coefficient
+  std::optional<Bump> bump = {};     ///< then it has this one member
+  int harmonics = 2;                 ///< of each joint reading, in products
+  Eigen::VectorXd share = {};        ///< of the size, per member; members of 0 are left out; empty: all of it
   double gain = 0;  ///< evidence (D9): 2 ln of the Bayes factor, less 2 ln of the number of functions tried
 };
 std::vector<SmoothFunction> smooth_functions(const GapSystem& system, const ResidualAnalysis& left,
@@ -58,6 +58,16 @@ Eigen::MatrixXd members(const SmoothFunction& function, const std::vector<Variab
 /// 1992; Tipping 2001). `information` and `right` are of the members whose prior is 1. The evidence less 2 per member
 /// that stays is put into `gain`.
 Eigen::VectorXd relevance(const Eigen::MatrixXd& information, const Eigen::VectorXd& right, double& gain);
+
+/// The best bumps of two joint readings that turn a joint, best first; each has four parameters: size, two centres, width.
+std::vector<SmoothFunction> bump_functions(const GapSystem& system, const ResidualAnalysis& left,
+                                           const std::vector<Variable>& of, std::size_t most);
+
+/// Adds the effect `unnamed` with the bilinear table that is closest to a function (least squares; docs/model.md, M7).
+/// Nothing is added where the function follows the order of measurement, which no controller has.
+/// \param value  of its members, rad
+void add_smooth_table(const SmoothFunction& function, const Eigen::VectorXd& value,
+                      const std::vector<Variable>& variables, const Robot& robot, ParametricModel& model);
 
 }  // namespace flexcomp::host
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "diagnosis/smooth_table.hpp"
+// An unnamed function as a table that the core reads (docs/model.md, M7).
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "diagnosis/smooth_functions.hpp"
 #include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
@@ -45,7 +46,7 @@ std::vector<double> nodes_of(const Bump& bump, std::size_t side, double low, dou
       if (at > low && at < high) nodes.push_back(at);
     }
   }
-  std::sort(nodes.begin(), nodes.end());
+  std::ranges::sort(nodes);
   nodes.erase(std::unique(nodes.begin(), nodes.end(), [](double a, double b) { return b - a < 1e-6; }),
               nodes.end());
   return nodes;
@@ -80,12 +81,11 @@ EffectId table_id(const SmoothFunction& function, const std::vector<const Variab
 
 }  // namespace
 
-void add_smooth_table(const Hypothesis& hypothesis, const std::vector<Variable>& variables,
-                      const Robot& robot, ParametricModel& model) {
-  const SmoothFunction& function = *hypothesis.function;
+void add_smooth_table(const SmoothFunction& function, const Eigen::VectorXd& value,
+                      const std::vector<Variable>& variables, const Robot& robot, ParametricModel& model) {
   std::vector<const Variable*> of;
   for (const std::size_t v : function.of) of.push_back(&variables[v]);
-  if (std::any_of(of.begin(), of.end(), [](const Variable* v) { return v->is_order; })) return;
+  if (std::ranges::any_of(of, [](const Variable* v) { return v->is_order; })) return;
   const EffectId id = table_id(function, of);
   add_effect(model, id, robot.nominal);
   const Term<double>& term = model.set.terms.back();
@@ -104,8 +104,8 @@ void add_smooth_table(const Hypothesis& hypothesis, const std::vector<Variable>&
   }
   const Eigen::MatrixXd phi = members(function, variables, at);
   // Columns that the projection took away have no coefficient: then the numbers differ, and the function is as it was.
-  if (phi.cols() != hypothesis.value.size()) return;
-  const Eigen::VectorXd v = phi * hypothesis.value;
+  if (phi.cols() != value.size()) return;
+  const Eigen::VectorXd v = phi * value;
   const Eigen::Map<const RowMajor> fine(v.data(), rows, columns);
   const RowMajor coarse = line[0].nearest * fine * line[1].nearest.transpose();
   for (Eigen::Index k = 0; k < coarse.size(); ++k) values[k] = coarse.data()[k];

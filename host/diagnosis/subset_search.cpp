@@ -34,8 +34,7 @@ void subtract_evidence_cost(double& gain, const Block& block, const Eigen::Matri
 bool is_part_of(const Block& function, const EffectId& id) {
   if (id.joint != function.function_joint) return false;
   const auto follows = [&](unsigned joint) {
-    return std::find(function.function_readings.begin(), function.function_readings.end(), joint) !=
-           function.function_readings.end();
+    return std::ranges::find(function.function_readings, joint) != function.function_readings.end();
   };
   const EffectDescriptor& d = descriptor(id.effect);
   if (d.in_paper_model || d.place(id) != Place{static_cast<std::uint8_t>(id.joint), slot::theta})
@@ -131,7 +130,7 @@ Scored SubsetSearch::score(const Subset& subset) const {
   Scored out;
   // Blocks with a prior come last: the factor's diagonal is then that of their Schur complement.
   out.blocks = subset;
-  std::stable_sort(out.blocks.begin(), out.blocks.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(out.blocks, [&](std::size_t a, std::size_t b) {
     return (system_.blocks[a].precision > 0) < (system_.blocks[b].precision > 0);
   });
   const Selected s = selected(out.blocks);
@@ -173,8 +172,7 @@ std::vector<double> SubsetSearch::extensions(const Subset& subset) const {
   }
   std::vector<double> gains(system_.blocks.size(), minus_infinity);
   for (std::size_t b = 0; b < system_.blocks.size(); ++b) {
-    if (std::any_of(subset.begin(), subset.end(), [&](std::size_t o) { return o == b || !compatible(o, b); }))
-      continue;
+    if (std::ranges::any_of(subset, [&](std::size_t o) { return o == b || !compatible(o, b); })) continue;
     gains[b] = gain_of_adding(system_.blocks[b], reduced, done);
   }
   return gains;
@@ -256,12 +254,12 @@ Scored SubsetSearch::beam_search(std::size_t largest, const std::vector<Subset>&
       for (std::size_t k = 0; k < few; ++k) {
         Subset t = s;
         t.push_back(order[k]);
-        std::sort(t.begin(), t.end());
+        std::ranges::sort(t);
         if (!seen.insert(t).second) continue;
         next.emplace_back(here + gains[order[k]] - margins(t), t);
       }
     }
-    std::sort(next.begin(), next.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::ranges::sort(next, [](const auto& a, const auto& b) { return a.first > b.first; });
     front.clear();
     bool better = false;
     for (const auto& [guess, s] : next) {

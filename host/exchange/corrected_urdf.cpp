@@ -19,7 +19,6 @@
 #include "files/read_file.hpp"
 #include "input_error.hpp"
 #include "linalg/decompositions.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "model/effects.hpp"
 #include "model/frames.hpp"
 #include "model/set_difference.hpp"

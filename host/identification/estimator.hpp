@@ -21,7 +21,7 @@ struct EstimatorOptions {
   /// False: without Fit::singular_values (the most expensive part where unknowns are many).
   bool spectrum = true;
   /// Called after each accepted step with the iteration and the cost; may be empty.
-  std::function<void(int, double)> progress;
+  std::function<void(int, double)> progress = {};
 };
 
 /// Result of fit().

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "identification/frames.hpp"
-
+// The measurement frames F and E, Eq. (M2): start in closed form, then refinement.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
+#include "identification/identify.hpp"
 #include "identification/statistics.hpp"
 #include "linalg/decompositions.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "measurement/reflectors.hpp"
 #include "units.hpp"
 
@@ -73,8 +72,7 @@ void solve_translations(const std::vector<Observation>& rows, const std::vector<
 }  // namespace
 
 Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot) {
-  Estimate start;
-  start.set = set;
+  Estimate start{.set = set};
   const auto model = prepare(set, robot, "frames");
   std::vector<Pose<double>> poses;
   Points measured;

@@ -64,9 +64,8 @@ Elimination eliminate(const Eigen::MatrixXd& all_rows, const std::vector<std::si
     }
   }
   out.kept = kept_in_order;
-  std::sort(out.kept.begin(), out.kept.end());
-  std::sort(out.dependent.begin(), out.dependent.end(),
-            [](const DependentColumn& a, const DependentColumn& b) { return a.column < b.column; });
+  std::ranges::sort(out.kept);
+  std::ranges::sort(out.dependent, {}, &DependentColumn::column);
   return out;
 }
 
@@ -85,8 +84,7 @@ std::vector<std::size_t> elimination_order(const Unknowns& unknowns, const TermS
   };
   std::vector<std::size_t> order(unknowns.count());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
   return order;
 }
 

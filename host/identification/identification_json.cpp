@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "identification/identification_json.hpp"
 
-#include "identification/fitted_parameters.hpp"
 #include "json.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
 
 namespace {
-
-Json confounded_json(const std::vector<Confounded>& list) {
-  Json j = Json::array();
-  for (const Confounded& c : list) j.push_back({{"parameter", c.parameter}, {"with", c.with}});
-  return j;
-}
 
 Json repeats_json(const std::optional<PureError>& e) {
   if (!e) return nullptr;
@@ -43,34 +36,27 @@ Json to_json(const Before& before) {
 }
 
 Json to_json(const Identification& r, const std::vector<Observation>& rows) {
-  Json parameters = Json::array();
-  for (const FittedParameter& row : fitted_parameters(r)) {
-    parameters.push_back({{"name", row.name},
-                          {"value", row.value},
-                          {"sigma", row.sigma},
-                          {"interval95", {row.low, row.high}},
-                          {"at_bound", row.at_bound},
-                          {"significant", row.significant()}});
-  }
-  Json cure = Json::array();
-  Json cure_payload = Json::array();
-  for (const SuggestedPose& c : r.identifiability.suggested_poses) {
-    Json pose = Json::array();
-    for (const double v : c.q_rad) pose.push_back(degrees(v));
-    cure.push_back(pose);
-    cure_payload.push_back(c.payload_kg);
-  }
-  Json gains = Json::array();
-  for (const PayloadGain& gain : r.identifiability.payload_gains)
-    gains.push_back({{"parameter", gain.parameter}, {"sigma_ratio", gain.sigma_with_both / gain.sigma}});
-  std::vector<std::size_t> outlier_lines;
-  for (const std::size_t k : r.outliers) outlier_lines.push_back(rows[k].line);
+  const Identifiability& known = r.identifiability;
+  const Json values = json_list(fitted_parameters(r), [](const FittedParameter& row) -> Json {
+    return {{"name", row.name},         {"value", row.value},
+            {"sigma", row.sigma},       {"interval95", {row.low, row.high}},
+            {"at_bound", row.at_bound}, {"significant", row.significant()}};
+  });
+  const Json confounded = json_list(known.confounded, [](const Confounded& c) -> Json {
+    return {{"parameter", c.parameter}, {"with", c.with}};
+  });
+  const Json cure =
+      json_list(known.suggested_poses, [](const SuggestedPose& c) { return json_list(c.q_rad, degrees); });
+  const Json gains = json_list(known.payload_gains, [](const PayloadGain& gain) -> Json {
+    return {{"parameter", gain.parameter}, {"sigma_ratio", gain.sigma_with_both / gain.sigma}};
+  });
+  const Json outlier_lines = json_list(r.outliers, [&](std::size_t k) { return rows[k].line; });
   return {{"parameters", r.parameters},
           {"identifiable", r.identifiable},
-          {"confounded", confounded_json(r.identifiability.confounded)},
-          {"missing", r.identifiability.missing},
+          {"confounded", confounded},
+          {"missing", known.missing},
           {"cure_deg", cure},
-          {"cure_payload_kg", cure_payload},
+          {"cure_payload_kg", json_list(known.suggested_poses, &SuggestedPose::payload_kg)},
           {"second_payload_gains", gains},
           {"frame_parameters", r.frame_parameters},
           {"poses", rows.size()},
@@ -85,7 +71,7 @@ Json to_json(const Identification& r, const std::vector<Observation>& rows) {
           {"pure_error", repeats_json(r.pure_error)},
           {"before", to_json(r.before)},
           {"after", to_json(r.after)},
-          {"values", parameters}};
+          {"values", values}};
 }
 
 }  // namespace flexcomp::host

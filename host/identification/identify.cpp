@@ -43,8 +43,7 @@ double spread(const std::vector<Eigen::Vector3d>& points) {
 void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& set,
          std::vector<Parameter>& parameters) {
   for (const FixedParameter& f : fixed) {
-    const auto found = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const Parameter& p) { return p.name == f.name; });
+    const auto found = std::ranges::find(parameters, f.name, &Parameter::name);
     if (found == parameters.end()) {
       std::vector<std::string> names;
       for (const Parameter& p : parameters) names.push_back(p.name);
@@ -99,9 +98,8 @@ std::vector<std::string> doubts_about(const Identification& result, std::size_t 
 
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted) {
   Before before;
-  Estimate nominal;
   const auto model = prepare(TermSet(), robot, "nominal robot");
-  before.nominal_frames = statistics(residuals(nominal, *model, rows), rows);
+  before.nominal_frames = statistics(residuals(Estimate(), *model, rows), rows);
   // With fewer than four rows the 6 + 3 frame parameters fit any data.
   if (rows.size() >= 4) {
     const Estimate frames = fit_frames(TermSet(), rows, robot);
@@ -141,11 +139,10 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   out.before = errors_before(robot, rows, &start);
   if (!options.force) require_plausible_residuals(robot, rows, source, out.before);
 
-  Estimate nominal;
   const auto nominal_model = prepare(TermSet(), robot, source);
   const bool fit_frames_too = options.frames == FrameChoice::fit ||
                               (options.frames == FrameChoice::by_distance &&
-                               nominal_frames_are_off(residuals(nominal, *nominal_model, rows), rows));
+                               nominal_frames_are_off(residuals(Estimate(), *nominal_model, rows), rows));
   if (!fit_frames_too) start = Estimate();
   out.nominal = residuals(start, *nominal_model, rows);
 
@@ -163,11 +160,8 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   out.frame_parameters = fitted.frames.size();
   out.identifiable = fitted.parameters.size();
 
-  if (fitted.count() > 0) {
-    out.fit = fit(start, fitted, rows, robot, options.estimator);
-  } else {
-    out.fit.estimate = start;
-  }
+  out.fit.estimate = start;
+  if (fitted.count() > 0) out.fit = fit(start, fitted, rows, robot, options.estimator);
 
   const Eigen::VectorXd& s = out.fit.singular_values;
   if (s.size() > 0 && s[s.size() - 1] > 0) {
@@ -194,6 +188,21 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
                                {"after_max_mm", out.after.max_m * 1e3}};
   out.doubts = doubts_about(out, rows.size());
   return out;
+}
+
+std::vector<FittedParameter> fitted_parameters(const Identification& r) {
+  std::vector<FittedParameter> rows;
+  const Unknowns& fitted = r.identifiability.fitted;
+  const Eigen::VectorXd units = units_of(fitted, r.fit.estimate.set);
+  for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {
+    const Parameter& parameter = fitted.parameters[p];
+    const double unit = parameter.si_per_file_unit();
+    const Eigen::Index i = static_cast<Eigen::Index>(fitted.frames.size() + p);
+    rows.push_back({parameter.name, parameter.get(r.fit.estimate.set) / unit,
+                    std::sqrt(std::max(0.0, r.fit.covariance(i, i))) * units[i] / unit,
+                    r.fit.interval[p].low / unit, r.fit.interval[p].high / unit, r.fit.at_bound[p]});
+  }
+  return rows;
 }
 
 }  // namespace flexcomp::host

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "identification/estimator.hpp"
-#include "identification/frames.hpp"
 #include "identification/parameter_selection.hpp"
 #include "identification/statistics.hpp"
 #include "measurement/repeats.hpp"
@@ -19,6 +18,8 @@
 #include "model/tolerance.hpp"
 
 namespace flexcomp::host {
+
+enum class FrameChoice { by_distance, nominal, fit };
 
 /// Parameter that is not fitted, with its given value.
 struct FixedParameter {
@@ -29,12 +30,12 @@ struct FixedParameter {
 struct IdentifyOptions {
   ModelKind model = ModelKind::full;
   FrameChoice frames = FrameChoice::by_distance;
-  std::vector<FixedParameter> fixed;
-  std::vector<Tolerance> tolerances;  ///< of parameters by name; later ones win
-  bool physical = true;               ///< bounds compliances at zero
-  bool force = false;                 ///< accept residuals that suggest another unit or arm
-  std::uint64_t seed = 1;             ///< of the 1,000 random reference poses of the identifiability analysis
-  EstimatorOptions estimator;
+  std::vector<FixedParameter> fixed = {};
+  std::vector<Tolerance> tolerances = {};  ///< of parameters by name; later ones win
+  bool physical = true;                    ///< bounds compliances at zero
+  bool force = false;                      ///< accept residuals that suggest another unit or arm
+  std::uint64_t seed = 1;  ///< of the 1,000 random reference poses of the identifiability analysis
+  EstimatorOptions estimator = {};
 };
 
 /// Errors of the nominal arm.
@@ -58,7 +59,7 @@ struct Identification {
   std::vector<RowResidual> residuals;  ///< after, per row
   std::vector<std::size_t> outliers;   ///< down-weighted rows, by index
   std::optional<PureError>
-      pure_error;  ///< of repeated rows, outliers left out; nothing where none are repeated
+      pure_error;  ///< of repeated rows without outliers; nothing where none are repeated
   /// Reasons why the result is not reliable; empty where it is.
   std::vector<std::string> doubts;
 };
@@ -74,10 +75,31 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
 /// Errors of the nominal arm, in nominal and in fitted frames. \param fitted  receives the fitted frames, may be null
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
 
+/// Estimates the measurement frames F (robot base in the instrument's frame) and E (measured point in Ftool), Eq. (M2), for
+/// given terms (none: the nominal arm): closed-form start, then robust refinement.
+Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot);
+
+/// True where the nominal frames (F = E = 1) miss the median row by more than 20 mm or 2 degrees.
+bool nominal_frames_are_off(const std::vector<RowResidual>& nominal, const std::vector<Observation>& rows);
+
 /// Refuses residuals to the nominal arm above 100 times the usual 0.5 mm per metre of reach: another unit or arm.
 /// \throws InputError
 void require_plausible_residuals(const Robot& robot, const std::vector<Observation>& rows,
                                  const std::string& source, const Before& before);
+
+/// What is said of one fitted parameter, in the unit of files.
+struct FittedParameter {
+  std::string name;
+  double value = 0;
+  double sigma = 0;
+  double low = 0;
+  double high = 0;
+  bool at_bound = false;
+  /// Different from the nominal arm beyond chance: zero lies outside the 95 % interval.
+  bool significant() const { return low > 0 || high < 0; }
+};
+
+std::vector<FittedParameter> fitted_parameters(const Identification& r);
 
 }  // namespace flexcomp::host
 

@@ -15,31 +15,12 @@ namespace {
 
 constexpr std::size_t reference_count = 1000;
 
-Eigen::MatrixXd select(const Eigen::MatrixXd& m, const std::vector<std::size_t>& columns) {
-  Eigen::MatrixXd out(m.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    out.col(static_cast<Eigen::Index>(k)) = m.col(static_cast<Eigen::Index>(columns[k]));
-  }
-  return out;
-}
-
 /// Standard deviations in units from an information matrix.
 Eigen::VectorXd sigmas(const Eigen::MatrixXd& information) {
   return Ldlt(information).inverse().diagonal().cwiseMax(0).cwiseSqrt();
 }
 
 Eigen::MatrixXd information(const Eigen::MatrixXd& matrix) { return matrix.transpose() * matrix; }
-
-Eigen::MatrixXd select_both(const Eigen::MatrixXd& m, const std::vector<std::size_t>& kept) {
-  Eigen::MatrixXd out(kept.size(), kept.size());
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    for (std::size_t k = 0; k < kept.size(); ++k) {
-      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          m(static_cast<Eigen::Index>(kept[i]), static_cast<Eigen::Index>(kept[k]));
-    }
-  }
-  return out;
-}
 
 /// Test of weak identifiability: the rows' columns against the information of as many random rows.
 struct WeaknessTest {
@@ -56,15 +37,15 @@ struct WeaknessTest {
     const Eigen::MatrixXd here_all = information(data);
     std::vector<std::size_t> dropped;
     while (!kept.empty()) {
-      const Eigen::VectorXd here = sigmas(select_both(here_all, kept));
-      const Eigen::VectorXd there = sigmas(select_both(reference, kept));
+      const Eigen::VectorXd here = sigmas(here_all(kept, kept));
+      const Eigen::VectorXd there = sigmas(reference(kept, kept));
       std::size_t worst = kept.size();
       std::size_t latest = 0;
       for (std::size_t k = 0; k < kept.size(); ++k) {
         const Eigen::Index i = static_cast<Eigen::Index>(k);
         if (kept[k] < frames || !(here[i] > too_many && here[i] > too_many * there[i])) continue;
         const std::size_t position =
-            static_cast<std::size_t>(std::find(order.begin(), order.end(), kept[k]) - order.begin());
+            static_cast<std::size_t>(std::ranges::find(order, kept[k]) - order.begin());
         if (worst == kept.size() || position > latest) {
           worst = k;
           latest = position;
@@ -126,19 +107,19 @@ std::vector<SuggestedPose> suggest_poses(WeaknessTest test, const Eigen::MatrixX
 }
 
 bool has_stiffness(const Unknowns& unknowns, const TermSet& set) {
-  return std::any_of(unknowns.parameters.begin(), unknowns.parameters.end(), [&](const Parameter& p) {
+  return std::ranges::any_of(unknowns.parameters, [&](const Parameter& p) {
     return set.terms[p.terms.front()].effect == Effect::joint_compliance;
   });
 }
 
 bool one_payload(const std::vector<Observation>& rows) {
-  return std::all_of(rows.begin(), rows.end(), [&](const Observation& row) {
+  return std::ranges::all_of(rows, [&](const Observation& row) {
     return std::abs(row.context.payload_kg - rows.front().context.payload_kg) < 1e-6;
   });
 }
 
 bool without_any_load(const std::vector<Observation>& rows) {
-  return std::all_of(rows.begin(), rows.end(), [](const Observation& row) {
+  return std::ranges::all_of(rows, [](const Observation& row) {
     const auto& f = row.context.force_n;
     return row.context.payload_kg == 0 && f[0] == 0 && f[1] == 0 && f[2] == 0;
   });
@@ -199,7 +180,7 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
   }
   std::vector<std::size_t> possible_order;
   for (const std::size_t c : order) {
-    if (std::binary_search(possible.kept.begin(), possible.kept.end(), c)) possible_order.push_back(c);
+    if (std::ranges::binary_search(possible.kept, c)) possible_order.push_back(c);
   }
   WeaknessTest test;
   test.data = data_matrix;
@@ -228,14 +209,14 @@ Identifiability analyse_identifiability(const Robot& robot, const std::vector<Ob
   if (!missing.empty()) {
     // In the elimination order, so that the same columns are tested as above; frames come first in it.
     WeaknessTest selected;
-    selected.data = select(data_matrix, possible_order);
-    selected.reference = select_both(test.reference, possible_order);
-    selected.frames = static_cast<std::size_t>(std::count_if(possible_order.begin(), possible_order.end(),
-                                                             [&](std::size_t c) { return c < test.frames; }));
-    out.suggested_poses = suggest_poses(selected, select(reference_matrix, possible_order), reference);
+    selected.data = data_matrix(Eigen::all, possible_order);
+    selected.reference = test.reference(possible_order, possible_order);
+    selected.frames = static_cast<std::size_t>(
+        std::ranges::count_if(possible_order, [&](std::size_t c) { return c < test.frames; }));
+    out.suggested_poses = suggest_poses(selected, reference_matrix(Eigen::all, possible_order), reference);
   } else if (one_payload(rows) && rows.front().context.payload_kg > 0 && has_stiffness(all, start.set)) {
     out.payload_gains = second_payload_gains(reference, start, *model, out.fitted,
-                                             sigmas(information(select(data_matrix, fitted_columns))));
+                                             sigmas(information(data_matrix(Eigen::all, fitted_columns))));
   }
   return out;
 }

@@ -32,8 +32,8 @@ struct PayloadGain {
 struct Identifiability {
   Unknowns fitted;                     ///< identifiable from these rows
   std::vector<Confounded> confounded;  ///< not separable by any rows of this kind
-  std::vector<std::string>
-      missing;  ///< identifiable from 1,000 random poses of this kind, but not from these rows
+  /// Identifiable from 1,000 random poses of this kind, but not from these rows.
+  std::vector<std::string> missing;
   /// Poses that would identify the missing parameters, best first; empty where none is missing.
   std::vector<SuggestedPose> suggested_poses;
   std::vector<PayloadGain> payload_gains;  ///< where all rows have one payload; largest sigma first

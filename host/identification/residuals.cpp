@@ -2,7 +2,9 @@
 #include "identification/residuals.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "flexcomp/forward.hpp"
 #include "flexcomp/identification.hpp"
@@ -44,59 +46,6 @@ RowResidual residual_of(const Estimate& estimate, const Observation& row, const 
   }
   return r;
 }
-
-}  // namespace
-
-Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
-  const Eigen::AngleAxisd turn{Eigen::Quaterniond(rotation).normalized()};
-  return turn.axis() * (turn.angle() > pi ? turn.angle() - 2 * pi : turn.angle());
-}
-
-Eigen::Matrix3d rotation_of(const Eigen::Vector3d& w) {
-  const double angle = w.norm();
-  if (angle < 1e-300) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
-}
-
-Vector6<double> whitened(const Observation& row, const RowResidual& residual) {
-  Vector6<double> e;
-  e << residual.position_m, residual.orientation_rad;
-  return row.whitening * e;
-}
-
-Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
-  const Eigen::Index n = row.has_orientation ? 6 : 3;
-  Vector6<double> e = Vector6<double>::Zero();
-  e.head(n) = inverse(row.whitening.topLeftCorner(n, n)) * whitened.head(n);
-  return e;
-}
-
-std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
-                                   const std::vector<Observation>& rows) {
-  std::vector<RowResidual> out;
-  out.reserve(rows.size());
-  Workspace<double, joint_count> ws;
-  for (const Observation& row : rows) {
-    const Pose<double> pose = forward(model, row.q_rad, row.context, ws);
-    const Eigen::Vector3d point = pose.position + pose.rotation * (ws.point + estimate.e.position);
-    out.push_back(residual_of(estimate, row, pose, point));
-  }
-  return out;
-}
-
-std::vector<RowResidual> residuals(const Estimate& estimate, const Robot& robot,
-                                   const std::vector<Observation>& rows, const std::string& source) {
-  return residuals(estimate, *prepare(estimate.set, robot, source), rows);
-}
-
-Eigen::VectorXd whitened(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows) {
-  Eigen::VectorXd out(6 * static_cast<Eigen::Index>(residuals.size()));
-  for (std::size_t k = 0; k < residuals.size(); ++k)
-    out.segment<6>(6 * static_cast<Eigen::Index>(k)) = whitened(rows[k], residuals[k]);
-  return out;
-}
-
-namespace {
 
 /// Derivative of a table term for one value of its table: spline weight (M6) or bilinear weight (M7), times the factor.
 double table_weight(const TermSet& set, const Term<double>& term, std::size_t value, const HostModel& model,
@@ -169,6 +118,55 @@ Eigen::Matrix<double, 6, 12> frame_columns_of(const Estimate& estimate, const Po
 
 }  // namespace
 
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
+  const Eigen::AngleAxisd turn{Eigen::Quaterniond(rotation).normalized()};
+  return turn.axis() * (turn.angle() > pi ? turn.angle() - 2 * pi : turn.angle());
+}
+
+Eigen::Matrix3d rotation_of(const Eigen::Vector3d& w) {
+  const double angle = w.norm();
+  if (angle < 1e-300) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
+}
+
+Vector6<double> whitened(const Observation& row, const RowResidual& residual) {
+  Vector6<double> e;
+  e << residual.position_m, residual.orientation_rad;
+  return row.whitening * e;
+}
+
+Vector6<double> unwhitened(const Observation& row, const Vector6<double>& whitened) {
+  const Eigen::Index n = row.has_orientation ? 6 : 3;
+  Vector6<double> e = Vector6<double>::Zero();
+  e.head(n) = inverse(row.whitening.topLeftCorner(n, n)) * whitened.head(n);
+  return e;
+}
+
+std::vector<RowResidual> residuals(const Estimate& estimate, const HostModel& model,
+                                   const std::vector<Observation>& rows) {
+  std::vector<RowResidual> out;
+  out.reserve(rows.size());
+  Workspace<double, joint_count> ws;
+  for (const Observation& row : rows) {
+    const Pose<double> pose = forward(model, row.q_rad, row.context, ws);
+    const Eigen::Vector3d point = pose.position + pose.rotation * (ws.point + estimate.e.position);
+    out.push_back(residual_of(estimate, row, pose, point));
+  }
+  return out;
+}
+
+std::vector<RowResidual> residuals(const Estimate& estimate, const Robot& robot,
+                                   const std::vector<Observation>& rows, const std::string& source) {
+  return residuals(estimate, *prepare(estimate.set, robot, source), rows);
+}
+
+Eigen::VectorXd whitened(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows) {
+  Eigen::VectorXd out(6 * static_cast<Eigen::Index>(residuals.size()));
+  for (std::size_t k = 0; k < residuals.size(); ++k)
+    out.segment<6>(6 * static_cast<Eigen::Index>(k)) = whitened(rows[k], residuals[k]);
+  return out;
+}
+
 Linearised linearised(const Estimate& estimate, const HostModel& model, const std::vector<Observation>& rows,
                       const Unknowns& unknowns) {
   const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
@@ -219,12 +217,9 @@ Linearised linearised(const Estimate& estimate, const HostModel& model, const st
 }
 
 std::vector<std::size_t> free_frames(const std::vector<Observation>& rows) {
-  std::size_t count = 9;
-  for (const Observation& row : rows) {
-    if (row.has_orientation) count = 12;
-  }
-  std::vector<std::size_t> all(count);
-  for (std::size_t i = 0; i < count; ++i) all[i] = i;
+  const bool oriented = std::ranges::any_of(rows, &Observation::has_orientation);
+  std::vector<std::size_t> all(oriented ? 12 : 9);
+  std::iota(all.begin(), all.end(), std::size_t{0});
   return all;
 }
 

@@ -19,17 +19,17 @@ namespace flexcomp::host {
 
 /// Estimate: the coefficients of all terms and the measurement frames.
 struct Estimate {
-  TermSet set;
-  Pose<double> f;  ///< Fb in the measurement frame
-  Pose<double> e;  ///< measured frame in Ftool
+  TermSet set = {};
+  Pose<double> f = {};  ///< Fb in the measurement frame
+  Pose<double> e = {};  ///< measured frame in Ftool
 };
 
 /// Unknowns of a fit: free frame parameters first in every matrix, then the parameters.
 struct Unknowns {
   /// Free frame parameters: 0 … 5 are x y z rx ry rz of F, 6 … 11 those of E. Ascending; empty: frames are fixed.
-  std::vector<std::size_t> frames;
-  std::vector<Parameter> parameters;
-  std::vector<PriorKnowledge> prior;  ///< one per parameter; may be shorter: the others have none
+  std::vector<std::size_t> frames = {};
+  std::vector<Parameter> parameters = {};
+  std::vector<PriorKnowledge> prior = {};  ///< one per parameter; may be shorter: the others have none
 
   std::size_t count() const { return frames.size() + parameters.size(); }
   PriorKnowledge prior_of(std::size_t parameter) const {

@@ -20,14 +20,12 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
                                    const Robot& robot) {
   const CovarianceFactor& covariance = *calibration.covariance;
   Unknowns unknowns;
-  Unknowns every_frame;
-  every_frame.frames = free_frames(rows);
+  const Unknowns every_frame{.frames = free_frames(rows)};
   const std::vector<std::string> frame_names = names_of(every_frame);
   const std::vector<Parameter> parameters = parameters_of(calibration.terms, robot.nominal);
   for (const std::string& name : covariance.parameters) {
-    const auto frame = std::find(frame_names.begin(), frame_names.end(), name);
-    const auto parameter = std::find_if(parameters.begin(), parameters.end(),
-                                        [&](const Parameter& p) { return p.name == name; });
+    const auto frame = std::ranges::find(frame_names, name);
+    const auto parameter = std::ranges::find(parameters, name, &Parameter::name);
     if (frame != frame_names.end()) {
       unknowns.frames.push_back(every_frame.frames[static_cast<std::size_t>(frame - frame_names.begin())]);
     } else if (parameter != parameters.end()) {

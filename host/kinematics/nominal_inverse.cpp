@@ -74,7 +74,7 @@ std::vector<JointVector> nominal_inverses(const NominalRobot<joint_count>& robot
   constexpr std::array<std::uint64_t, joint_count> primes{2, 3, 5, 7, 11, 13};
   std::vector<JointVector> out;
   const auto add = [&out](const JointVector& q) {
-    const bool found = std::any_of(out.begin(), out.end(), [&q](const JointVector& other) {
+    const bool found = std::ranges::any_of(out, [&q](const JointVector& other) {
       for (std::size_t j = 0; j < joint_count; ++j) {
         if (std::abs(q[j] - other[j]) > same_rad) return false;
       }

@@ -77,6 +77,10 @@ class PivotedQr {
 /// The shortest of all x that minimise |A x - b|.
 Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 
+/// The rotation R that maximises tr(R^T A) (Kabsch). Where A has rank 2, as for points in a plane, the determinant says
+/// which way the third direction points.
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& a);
+
 }  // namespace flexcomp::host
 
 #endif

@@ -9,7 +9,6 @@
 
 #include "distributions.hpp"
 #include "linalg/decompositions.hpp"
-#include "linalg/nearest_rotation.hpp"
 #include "model/frames.hpp"
 
 namespace flexcomp::host {

@@ -21,7 +21,7 @@ struct Excursion {
 using Failures = std::set<std::vector<std::size_t>>;
 
 std::vector<std::size_t> sorted(std::vector<std::size_t> v) {
-  std::sort(v.begin(), v.end());
+  std::ranges::sort(v);
   return v;
 }
 
@@ -32,7 +32,7 @@ void add_best(const CandidatePool& pool, Excursion& e, std::vector<Figures>& fig
   std::size_t best = pool.size();
   for (std::size_t c = 0; c < pool.size(); ++c) {
     if (best < pool.size() && !(figures[c].log_det > figures[best].log_det)) continue;
-    if (!pool.may_repeat && std::find(e.chosen.begin(), e.chosen.end(), c) != e.chosen.end()) continue;
+    if (!pool.may_repeat && std::ranges::find(e.chosen, c) != e.chosen.end()) continue;
     best = c;
   }
   e.chosen.push_back(best);

@@ -49,21 +49,10 @@ bool nearer(double squared_m2, double clearance_m) {
 }  // namespace
 
 std::string name_of(Obstruction obstruction) {
-  switch (obstruction) {
-    case Obstruction::joint_limit:
-      return "beyond a joint limit";
-    case Obstruction::bodies_touch:
-      return "bodies touch";
-    case Obstruction::tool_too_near:
-      return "tool too near to a body";
-    case Obstruction::beam_blocked:
-      return "beam blocked";
-    case Obstruction::facing_away:
-      return "reflectors face away";
-    case Obstruction::none:
-      break;
-  }
-  return "allowed";
+  static constexpr std::array<const char*, 6> names{"allowed",      "beyond a joint limit",
+                                                    "bodies touch", "tool too near to a body",
+                                                    "beam blocked", "reflectors face away"};
+  return names.at(static_cast<std::size_t>(obstruction));
 }
 
 Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
@@ -87,19 +76,16 @@ Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
   cos_acceptance_ = std::cos(settings.acceptance_rad);
   safety_ = settings.safety;
   smr_radius_m_ = settings.smr_radius_m;
-  for (std::size_t k = 0; k < robot.capsules.size(); ++k) {
-    Body body;
-    body.capsule = robot.capsules[k];
-    body.name = fmt::format("capsules[{}] of {}", k + 1, robot.path);
-    bodies_.push_back(body);
-  }
-  for (std::size_t k = 0; k < settings.obstacles.size(); ++k) {
-    Body body;
-    body.capsule = settings.obstacles[k];
-    body.name = fmt::format("obstacles[{}] of {}", k + 1, settings.path);
-    body.obstacle = true;
-    bodies_.push_back(body);
-  }
+  const auto add_bodies = [this](const std::vector<Capsule>& capsules, const std::string& list,
+                                 const std::string& path, bool obstacles) {
+    for (std::size_t k = 0; k < capsules.size(); ++k)
+      bodies_.push_back({.capsule = capsules[k],
+                         .name = fmt::format("{}[{}] of {}", list, k + 1, path),
+                         .obstacle = obstacles,
+                         .half_length_m = (capsules[k].to_m - capsules[k].from_m).norm() / 2});
+  };
+  add_bodies(robot.capsules, "capsules", robot.path, false);
+  add_bodies(settings.obstacles, "obstacles", settings.path, true);
 
   if (robot.capsules.empty()) {
     warnings_.push_back(
@@ -112,7 +98,6 @@ Feasibility::Feasibility(const Robot& robot, const std::optional<Cell>& cell)
     warnings_.push_back(
         fmt::format("{}: no tool.reflectors_mm: the tool point is tested as the reflector.", robot.path));
   }
-  for (Body& body : bodies_) body.half_length_m = (body.capsule.to_m - body.capsule.from_m).norm() / 2;
   std::vector<LinkFrames> samples(bodies_.empty() ? 0 : sample_count);
   RandomPoses random(limits_, sample_seed);
   for (LinkFrames& frames : samples) place(random(), frames);

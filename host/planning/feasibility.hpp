@@ -77,9 +77,9 @@ class Feasibility {
     double half_length_m = 0;
     double largest_clearance_m = 0;  ///< upper bound of the clearances below
     /// Clearances from the axis per reflector, m, of the reflector, its beam and its arm; below 0: not tested.
-    std::vector<double> reflector_clearance_m;
-    std::vector<double> beam_clearance_m;
-    std::vector<double> arm_clearance_m;
+    std::vector<double> reflector_clearance_m = {};
+    std::vector<double> beam_clearance_m = {};
+    std::vector<double> arm_clearance_m = {};
   };
   struct Pair {
     std::size_t first;

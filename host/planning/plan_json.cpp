@@ -42,8 +42,9 @@ Json to_json(const PlanTask& task, const PlanResult& result, const std::string& 
   j["resumed_at"] = result.resumed_at;
   j["seconds"] = result.cpu_seconds;
   j["stopped"] = result.stopped;
-  j["sigmas"] = Json::array();
-  for (const ExpectedSigma& s : result.sigmas) j["sigmas"].push_back({{"name", s.name}, {"value", s.value}});
+  j["sigmas"] = json_list(result.sigmas, [](const ExpectedSigma& s) -> Json {
+    return {{"name", s.name}, {"value", s.value}};
+  });
   j["payloads"] = Json::array();
   for (std::size_t p = 0; p < result.at_payload.size(); ++p) {
     j["payloads"].push_back(

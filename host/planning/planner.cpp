@@ -18,8 +18,9 @@ namespace flexcomp::host {
 
 namespace {
 
-std::uint64_t scaled(double number, double effort) {
-  return static_cast<std::uint64_t>(std::max(1.0, std::round(number * effort)));
+template <class Number>
+std::uint64_t scaled(Number number, double effort) {
+  return static_cast<std::uint64_t>(std::max(1.0, std::round(static_cast<double>(number) * effort)));
 }
 
 using Speeds = std::array<double, joint_count>;
@@ -27,7 +28,7 @@ using Speeds = std::array<double, joint_count>;
 /// Travel time, s, between joint positions at the joints' largest speeds; largest rotation, rad, where a speed
 /// is unknown.
 double distance(const Joints& a, const Joints& b, const Speeds& speed) {
-  const bool has_speeds = std::all_of(speed.begin(), speed.end(), [](double v) { return v > 0; });
+  const bool has_speeds = std::ranges::all_of(speed, [](double v) { return v > 0; });
   double longest = 0;
   for (std::size_t j = 0; j < joint_count; ++j) {
     longest = std::max(longest, std::abs(a[j] - b[j]) / (has_speeds ? speed[j] : 1));
@@ -93,12 +94,9 @@ bool moves_joints(Method method) { return method == Method::refine || method == 
 std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, double effort,
                                     std::uint64_t seed) {
   switch (method) {
-    case Method::refine: {
-      RefineOptions options;
-      options.evaluations = scaled(static_cast<double>(options.evaluations), effort);
-      options.seed = seed;
-      return std::make_unique<RefineSearch>(problem, options);
-    }
+    case Method::refine:
+      return std::make_unique<RefineSearch>(
+          problem, RefineOptions{.evaluations = scaled(RefineOptions().evaluations, effort), .seed = seed});
     case Method::exchange: {
       ExchangeOptions options;
       // About seven rounds until nothing changes.
@@ -108,18 +106,12 @@ std::unique_ptr<Search> make_search(Method method, const PlanProblem& problem, d
       options.seed = seed;
       return std::make_unique<ExchangeSearch>(problem, options);
     }
-    case Method::detmax: {
-      DetmaxOptions options;
-      options.restarts = scaled(static_cast<double>(options.restarts), effort);
-      options.seed = seed;
-      return std::make_unique<DetmaxSearch>(problem, options);
-    }
-    case Method::sapso: {
-      SapsoOptions options;
-      options.iterations = scaled(static_cast<double>(options.iterations), effort);
-      options.seed = seed;
-      return std::make_unique<SapsoSearch>(problem, options);
-    }
+    case Method::detmax:
+      return std::make_unique<DetmaxSearch>(
+          problem, DetmaxOptions{.restarts = scaled(DetmaxOptions().restarts, effort), .seed = seed});
+    case Method::sapso:
+      return std::make_unique<SapsoSearch>(
+          problem, SapsoOptions{.iterations = scaled(SapsoOptions().iterations, effort), .seed = seed});
   }
   return nullptr;
 }
@@ -171,7 +163,7 @@ std::vector<double> random_fitness(const PlanProblem& problem, std::size_t count
     out.push_back(exact.full_rank ? criterion.fitness(exact.figures)
                                   : std::numeric_limits<double>::infinity());
   }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return out;
 }
 
@@ -212,7 +204,7 @@ double path_length(const PoseSet& set, const Speeds& speed_rad_s) {
 PoseSet in_order_of_travel(const PlanProblem& problem, const PoseSet& set, const Speeds& speed_rad_s) {
   std::vector<std::size_t> payloads(problem.payloads.size());
   std::iota(payloads.begin(), payloads.end(), std::size_t{0});
-  std::stable_sort(payloads.begin(), payloads.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(payloads, [&](std::size_t a, std::size_t b) {
     return problem.payloads[a].payload_kg < problem.payloads[b].payload_kg;
   });
   PoseSet out;

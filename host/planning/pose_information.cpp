@@ -61,11 +61,10 @@ PoseInformation::PoseInformation(const Robot& robot, ModelKind kind, bool frames
   model_.prepare(robot.nominal, TermList<double>());  // no terms: nothing to refuse
   const ParametricModel paper = paper_model(robot.nominal, kind, !frames);
   parameters_of_model_ = paper.parameters.size();
-  Unknowns all;
-  all.parameters = paper.parameters;
+  Unknowns all{.parameters = paper.parameters};
   if (frames) {
-    const bool orientation = std::any_of(
-        like.begin(), like.end(), [](const PlannedMeasurement& s) { return s.instrument.rows() == 6; });
+    const bool orientation =
+        std::ranges::any_of(like, [](const PlannedMeasurement& s) { return s.instrument.rows() == 6; });
     for (std::size_t i = 0; i < (orientation ? 12U : 9U); ++i) all.frames.push_back(i);
   }
   frames_ = all.frames;

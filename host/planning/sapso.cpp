@@ -92,10 +92,8 @@ void SapsoSearch::step() {
       }
     }
   }
-  leader_ = static_cast<std::size_t>(
-      std::min_element(swarm_.begin(), swarm_.end(),
-                       [](const Particle& a, const Particle& b) { return a.best_value < b.best_value; }) -
-      swarm_.begin());
+  leader_ =
+      static_cast<std::size_t>(std::ranges::min_element(swarm_, {}, &Particle::best_value) - swarm_.begin());
   offer(swarm_[leader_].best, std::log(swarm_[leader_].best_value));
 }
 

@@ -29,7 +29,7 @@ struct SapsoOptions {
   std::uint64_t seed = 1;
   /// Objective; empty: the dual index with Omin in expectation. The studies set the form of Chen 30, with the true
   /// parameters. best_log_fitness() is then the logarithm of this objective.
-  std::function<double(const PoseSet&)> objective;
+  std::function<double(const PoseSet&)> objective = {};
 };
 
 /// Each step is one iteration of the swarm.

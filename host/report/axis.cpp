@@ -60,15 +60,14 @@ void sort_by_importance(std::vector<Tick>& ticks) {
     const double power = std::log10(t.value);
     return std::abs(power - std::round(power)) < 1e-6 ? 1 : 2;
   };
-  std::stable_sort(ticks.begin(), ticks.end(),
-                   [&](const Tick& a, const Tick& b) { return rank(a) < rank(b); });
+  std::ranges::stable_sort(ticks, [&](const Tick& a, const Tick& b) { return rank(a) < rank(b); });
 }
 
 }  // namespace
 
 double text_width(const std::string& text) {
   const auto starts_character = [](char c) { return (c & 0xC0) != 0x80; };
-  return letter_width * static_cast<double>(std::count_if(text.begin(), text.end(), starts_character));
+  return letter_width * static_cast<double>(std::ranges::count_if(text, starts_character));
 }
 
 double round_step(double range, int about) { return round_number(range / about, true); }
@@ -130,7 +129,7 @@ std::vector<Tick> ticks_of(const Axis& axis, double length, bool horizontal) {
   if (axis.named.empty() && !axis.scale.log) {
     for (int about = axis.about; about > 1; --about) {
       std::vector<Tick> ticks = axis.scale.ticks(about);
-      if (std::adjacent_find(ticks.begin(), ticks.end(), touch) == ticks.end()) return ticks;
+      if (std::ranges::adjacent_find(ticks, touch) == ticks.end()) return ticks;
     }
     return axis.scale.ticks(1);
   }
@@ -141,7 +140,7 @@ std::vector<Tick> ticks_of(const Axis& axis, double length, bool horizontal) {
   }
   std::vector<Tick> kept;
   for (const Tick& t : wanted) {
-    if (std::all_of(kept.begin(), kept.end(), [&](const Tick& k) { return apart(k, t); })) kept.push_back(t);
+    if (std::ranges::all_of(kept, [&](const Tick& k) { return apart(k, t); })) kept.push_back(t);
   }
   return kept;
 }

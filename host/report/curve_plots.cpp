@@ -6,7 +6,7 @@
 
 #include "report/plot_frame.hpp"
 #include "report/plots.hpp"
-#include "report/shown_poses.hpp"
+#include "report/pose_errors.hpp"
 
 namespace flexcomp::host {
 namespace {

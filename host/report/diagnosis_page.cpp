@@ -9,10 +9,10 @@
 #include "model/covariate.hpp"
 #include "model/place.hpp"
 #include "report/numbers.hpp"
-#include "report/parameters.hpp"
 #include "report/plots.hpp"
 #include "report/pose_errors.hpp"
 #include "report/results.hpp"
+#include "report/sections.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -23,22 +23,25 @@ constexpr std::size_t shown_places = 10;
 
 std::string chance(double p) { return p < 1e-3 ? "< 0.001" : fmt::format("{:.2g}", p); }
 
+/// The gap of an error when the noise is taken away, mm.
+std::string gap_text(const ErrorStatistics& error, double noise_floor_m) {
+  return mm_text(gap_of(error.rms_m, noise_floor_m));
+}
+
 /// From the model at the start to the last one, and the same on rows that nobody fitted.
 PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) {
-  PageSection section;
-  section.title = "How the gap shrinks";
+  PageSection section{"How the gap shrinks"};
   section.paragraphs = {fmt::format(
       "Position error (rms) {} mm before and {} mm after on the fitted rows; noise alone would give {} mm. "
       "The gap, "
       "noise taken away: {} mm before, {} mm after.",
       mm_text(d.error_before.rms_m), mm_text(d.error_after.rms_m), mm_text(d.noise_floor_m),
-      mm_text(gap_of(d.error_before.rms_m, d.noise_floor_m)),
-      mm_text(gap_of(d.error_after.rms_m, d.noise_floor_m)))};
-  Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]", {}, false, {}};
+      gap_text(d.error_before, d.noise_floor_m), gap_text(d.error_after, d.noise_floor_m))};
+  Curves curves{"Position error after each step of the diagnosis", "step", "rms [mm]"};
   if (d.noise_floor_m > 0) curves.floor = d.noise_floor_m * 1e3;
   if (!d.steps.empty())
     section.columns = {"step", "what", "rms [mm]", "chi-square per dof", "chi-square, left-out poses"};
-  Curve fitted{"fitted rows", {}, CurveStyle::joined, "before", {}};
+  Curve fitted{"fitted rows", {}, CurveStyle::joined, "before"};
   for (std::size_t k = 0; k < d.steps.size(); ++k) {
     const DiagnosisStep& s = d.steps[k];
     fitted.points.push_back({static_cast<double>(k), s.train_rms_m * 1e3});
@@ -54,15 +57,13 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
     curves.curves.push_back({"held-out rows, first and last",
                              {{0, others->before.rms_m * 1e3}, {last, others->after.rms_m * 1e3}},
                              CurveStyle::dots,
-                             "after",
-                             {}});
+                             "after"});
   }
   if (others) {
     section.paragraphs.push_back(fmt::format(
         "On {} rows that were not fitted: {} mm before, {} mm after; the gap {} mm before, {} mm after.",
         others->rows, mm_text(others->before.rms_m), mm_text(others->after.rms_m),
-        mm_text(gap_of(others->before.rms_m, others->noise_floor_m)),
-        mm_text(gap_of(others->after.rms_m, others->noise_floor_m))));
+        gap_text(others->before, others->noise_floor_m), gap_text(others->after, others->noise_floor_m)));
   }
   // One dot has no course.
   if (last > 0)
@@ -74,8 +75,7 @@ PageSection shrinking(const Diagnosis& d, const std::optional<HeldOut>& others) 
 }
 
 PageSection place(const Diagnosis& d) {
-  PageSection section;
-  section.title = "Where";
+  PageSection section{"Where"};
   if (d.where) {
     const std::string text = where_sentence(*d.where);
     section.paragraphs.push_back(
@@ -93,8 +93,7 @@ PageSection place(const Diagnosis& d) {
     if (bars.names.size() == shown_places) break;
     bars.names.push_back(place_name(p.place));
     bars.before.push_back(gap_mm * std::sqrt(std::max(0.0, p.explains)));
-    const auto left = std::find_if(d.places_left.begin(), d.places_left.end(),
-                                   [&](const PlaceShare& l) { return l.place == p.place; });
+    const auto left = std::ranges::find(d.places_left, p.place, &PlaceShare::place);
     // Nothing found, nothing changed.
     if (d.places_left.empty() || d.error_after.rms_m == d.error_before.rms_m) continue;
     bars.after.push_back(left == d.places_left.end() ? 0
@@ -115,16 +114,10 @@ std::vector<std::pair<std::string, std::string>> figures_of(const EffectProfile&
   // A row that sees the joint from near its axis says nothing of it, and would set the scale.
   std::vector<double> sigmas;
   for (const ProfileRow& r : profile.rows) sigmas.push_back(r.sigma_rad);
-  double enough = 0;
-  if (!sigmas.empty()) {
-    std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2),
-                     sigmas.end());
-    enough = 3 * sigmas[sigmas.size() / 2];
-  }
-  Curve line{"effect, 95 %", {}, profile.cases ? CurveStyle::usual : CurveStyle::line, "z", {}};
-  Curve without{"rows without it", {}, CurveStyle::dots, "before", {}};
-  Curve left{"rows, what is left", {}, CurveStyle::dots, "after", {}};
-  line.colour = "x";
+  const double enough = 3 * median(sigmas);
+  Curve line{"effect, 95 %", {}, profile.cases ? CurveStyle::usual : CurveStyle::line, "x"};
+  Curve without{"rows without it", {}, CurveStyle::dots, "before"};
+  Curve left{"rows, what is left", {}, CurveStyle::dots, "after"};
   for (const ProfilePoint& p : profile.line) {
     line.points.push_back({p.x, p.value_rad / arcsec});
     line.band.push_back(
@@ -157,9 +150,7 @@ std::pair<std::string, std::string> unnamed_figure(const Calibration& set, const
   const EffectId& id = group.id;
   const Unit unit = place_unit(id.place).name == "mm" ? unit::mm : unit::si;
   const bool length = unit.name == "mm";
-  Curves curves{
-      name(id), covariate_name(id.covariate[0], id.covariate_joint[0]), length ? "mm" : "arcsec", {}, false,
-      {}};
+  Curves curves{name(id), covariate_name(id.covariate[0], id.covariate_joint[0]), length ? "mm" : "arcsec"};
   const std::size_t columns = id.node[1].size();
   const std::size_t step = std::max<std::size_t>(1, (columns + 4) / 5);
   const auto shown = [](Covariate c, double v) { return c == Covariate::joint_position ? degrees(v) : v; };
@@ -177,10 +168,9 @@ std::pair<std::string, std::string> unnamed_figure(const Calibration& set, const
 }
 
 PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::vector<Observation>& rows) {
-  PageSection section;
-  section.title = "What was found";
-  section.columns = {"effect",    "largest [mm]",      "rms [mm]",           "p",
-                     "delta BIC", "to the controller", "cannot be told from"};
+  PageSection section{.title = "What was found",
+                      .columns = {"effect", "largest [mm]", "rms [mm]", "p", "delta BIC", "to the controller",
+                                  "cannot be told from"}};
   for (const FoundEffect& e : d.effects) {
     section.rows.push_back({name(e.id), mm_text(e.largest_m), mm_text(e.rms_m), chance(e.p_value),
                             fmt::format("{:.1f}", e.delta_bic), e.pushed ? "yes" : "no", rivals_text(e)});
@@ -206,8 +196,7 @@ PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::v
 }
 
 PageSection open_section(const Diagnosis& d) {
-  PageSection section;
-  section.title = "What these data could not be asked";
+  PageSection section{"What these data could not be asked"};
   if (!d.not_testable.empty()) section.columns = {"effect", "what it needs"};
   for (const NotTestable& n : d.not_testable) {
     const std::string text = not_testable_text(n);
@@ -225,18 +214,13 @@ PageSection open_section(const Diagnosis& d) {
 }
 
 PageSection telling_section(const Diagnosis& d) {
-  PageSection section;
-  section.title = "Poses that would tell the rivals apart";
-  section.columns = {"pose"};
-  for (std::size_t j = 0; j < joint_count; ++j) section.columns.push_back(fmt::format("q{} [deg]", j + 1));
-  section.columns.emplace_back("payload [kg]");
-  for (std::size_t k = 0; k < d.discriminating_poses.size(); ++k) {
-    std::vector<std::string> row{fmt::format("{}", k + 1)};
-    for (const double q : d.discriminating_poses[k].q_rad) row.push_back(fmt::format("{:.2f}", degrees(q)));
-    row.push_back(fmt::format("{:g}", d.discriminating_poses[k].payload_kg));
-    section.rows.push_back(row);
+  std::vector<std::array<double, joint_count>> q_rad;
+  std::vector<double> payload_kg;
+  for (const SuggestedPose& p : d.discriminating_poses) {
+    q_rad.push_back(p.q_rad);
+    payload_kg.push_back(p.payload_kg);
   }
-  return section;
+  return poses_table("Poses that would tell the rivals apart", q_rad, payload_kg, 2);
 }
 
 }  // namespace
@@ -246,18 +230,17 @@ Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Rob
   Page p = titled_page("Diagnosis of " + robot.name, robot);
   p.summary = verdict_sentence(d);
   p.doubts = d.doubts;
-  p.facts = {
-      {"data", data},
-      {"poses", fmt::format("{}", rows.size())},
-      {"chi-square per degree of freedom",
-       fmt::format("{:.3g} → {:.3g}", d.chi2_per_dof_before, d.chi2_per_dof_after)},
-      {"gap, fitted rows [mm]", fmt::format("{} → {}", mm_text(gap_of(d.error_before.rms_m, d.noise_floor_m)),
-                                            mm_text(gap_of(d.error_after.rms_m, d.noise_floor_m)))},
-      {"rows outside the bulk", fmt::format("{}", d.outliers.size())}};
+  p.facts = {{"data", data},
+             {"poses", fmt::format("{}", rows.size())},
+             {"chi-square per degree of freedom",
+              fmt::format("{:.3g} → {:.3g}", d.chi2_per_dof_before, d.chi2_per_dof_after)},
+             {"gap, fitted rows [mm]", fmt::format("{} → {}", gap_text(d.error_before, d.noise_floor_m),
+                                                   gap_text(d.error_after, d.noise_floor_m))},
+             {"rows outside the bulk", fmt::format("{}", d.outliers.size())}};
   if (others) {
-    p.facts.push_back({"gap, held-out rows [mm]",
-                       fmt::format("{} → {}", mm_text(gap_of(others->before.rms_m, others->noise_floor_m)),
-                                   mm_text(gap_of(others->after.rms_m, others->noise_floor_m)))});
+    p.facts.push_back(
+        {"gap, held-out rows [mm]", fmt::format("{} → {}", gap_text(others->before, others->noise_floor_m),
+                                                gap_text(others->after, others->noise_floor_m))});
   }
   p.sections.push_back(shrinking(d, others));
   p.sections.push_back(place(d));

@@ -8,7 +8,6 @@
 #include "report/plot_frame.hpp"
 #include "report/plots.hpp"
 #include "report/pose_errors.hpp"
-#include "report/shown_poses.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -39,7 +38,7 @@ Axis error_axis(const ErrorPairs& errors, int ticks = 5) {
 }
 
 std::string distribution_line(const PlotFrame& frame, std::vector<double> values, std::size_t most) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   std::string d;
   const auto n = static_cast<double>(values.size());
   double from = 0;
@@ -86,7 +85,7 @@ std::string plot_in_order(const ErrorPairs& errors, const Detail& detail) {
     if (errors.before.size() <= most_stems) stems += fmt::format("M{:.1f} {:.1f}V{:.1f}", at, upper, lower);
     before += dot(at, upper);
     after += dot(at, lower);
-    if (std::binary_search(errors.outliers.begin(), errors.outliers.end(), k)) apart += diamond(at, lower);
+    if (std::ranges::binary_search(errors.outliers, k)) apart += diamond(at, lower);
   }
   frame.add_path(stems, "stem");
   frame.add_path(before, dots_of(shown.size(), "before"));
@@ -140,7 +139,7 @@ std::string plot_histogram(const ErrorPairs& errors) {
 std::string plot_against(const std::vector<PagePose>& poses, const std::vector<double>& values,
                          const std::string& axis, const std::string& described, const Detail& detail) {
   if (values.empty()) return "";
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const auto [low, high] = std::ranges::minmax_element(values);
   const double margin = *high > *low ? 0.04 * (*high - *low) : 1;
   const Scale errors = residual_scale(poses);
   PlotFrame frame("What is left of the position error against " + described,

@@ -51,8 +51,7 @@ std::string escaped(std::string_view text) {
       continue;
     }
     const char c = text[at++];
-    const auto entity =
-        std::find_if(entities.begin(), entities.end(), [&](const auto& e) { return e.first == c; });
+    const auto entity = std::ranges::find_if(entities, [&](const auto& e) { return e.first == c; });
     // Control characters are not allowed in HTML at all, whatever they would mean.
     const bool control = (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7F;
     if (entity != entities.end()) {

@@ -78,7 +78,6 @@ std::vector<ModelFit> compare_models(const Robot& robot, const std::vector<Obser
       const auto model = prepare(r.fit.estimate.set, robot, source);
       m.parameters = r.identifiable;
       m.fitted = r.after;
-      m.fitted_m = lengths(r.residuals);
       m.chi2_per_dof = r.fit.chi2_per_dof();
       if (const auto errors = left_out(r, *model, rows)) {
         m.left_out = statistics(*errors, rows);

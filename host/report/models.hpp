@@ -15,9 +15,8 @@ namespace flexcomp::host {
 
 struct ModelFit {
   ModelKind kind = ModelKind::full;
-  std::size_t parameters = 0;    ///< identifiable
-  ErrorStatistics fitted;        ///< on the rows that it was fitted to
-  std::vector<double> fitted_m;  ///< position error, per row
+  std::size_t parameters = 0;  ///< identifiable
+  ErrorStatistics fitted;      ///< on the rows that it was fitted to
   double chi2_per_dof = 0;
   /// The same where each row in turn is left out of the fit and then predicted; nothing where a row alone makes a
   /// parameter known.

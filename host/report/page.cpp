@@ -23,8 +23,8 @@ std::string arm_section(const Page& page, bool web) {
 
 /// Whether the script has something to draw.
 bool has_data(const Page& page) {
-  return page.plan || std::any_of(page.poses.begin(), page.poses.end(),
-                                  [](const PagePoses& set) { return !set.poses.empty(); });
+  return page.plan ||
+         std::ranges::any_of(page.poses, [](const PagePoses& set) { return !set.poses.empty(); });
 }
 
 // Bytes, with some room for what closes the page; and poses for the script.
@@ -50,10 +50,9 @@ std::string script(const Page& page, std::size_t taken) {
 
 // Browsers take a backslash for a slash, and leave control characters and a blank at the start out before they look.
 bool is_local(const std::string& href) {
-  return !href.empty() && href[0] != '/' && href[0] != ' ' &&
-         std::none_of(href.begin(), href.end(), [](char c) {
-           return c == ':' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
-         });
+  return !href.empty() && href[0] != '/' && href[0] != ' ' && std::ranges::none_of(href, [](char c) {
+    return c == ':' || c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
+  });
 }
 
 bool has_web_parts() { return !web_script().empty(); }

@@ -55,7 +55,7 @@ struct PagePoses {
 struct PageParameter {
   std::string name;  ///< link1.theta_deg, joint_compliance[joint=2].rad_per_nm
   double value = 0;  ///< in the unit that the name ends with
-  std::optional<double> sigma;
+  std::optional<double> sigma = {};
 };
 
 struct PageConfounded {
@@ -80,10 +80,10 @@ struct PageResult {
 /// Text, a table and figures about anything that has no form of its own above.
 struct PageSection {
   std::string title;
-  std::vector<std::string> paragraphs;
-  std::vector<std::string> columns;  ///< of the table; none: no table
-  std::vector<std::vector<std::string>> rows;
-  std::vector<std::pair<std::string, std::string>> figures;  ///< SVG of plots.hpp and its caption
+  std::vector<std::string> paragraphs = {};
+  std::vector<std::string> columns = {};  ///< of the table; none: no table
+  std::vector<std::vector<std::string>> rows = {};
+  std::vector<std::pair<std::string, std::string>> figures = {};  ///< SVG of plots.hpp and its caption
 };
 
 /// A link to a page beside this one, or to one of its own sections.
@@ -103,9 +103,8 @@ struct PagePlan {
   std::vector<double> payload_kg;                            ///< per pose, or empty
   std::vector<std::array<double, joint_count>> known_q_rad;  ///< measured already
   std::array<std::pair<double, double>, joint_count> limits_rad{};
-  std::optional<Cell> cell;  ///< tracker and obstacles
-  std::vector<std::pair<std::string, double>>
-      expected;  ///< standard deviation per parameter, unit as the name says
+  std::optional<Cell> cell;                              ///< tracker and obstacles
+  std::vector<std::pair<std::string, double>> expected;  ///< sigma per parameter, unit as the name says
 };
 
 struct Page {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "report/plan_page.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>

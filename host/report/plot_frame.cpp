@@ -147,7 +147,7 @@ std::string diamond(double x, double y) {
 std::string dot(double x, double y) { return fmt::format("M{:.1f} {:.1f}h0", x, y); }
 
 std::string fine_dots(std::vector<std::array<double, 2>> places) {
-  std::sort(places.begin(), places.end());
+  std::ranges::sort(places);
   std::string d;
   long x = 0, y = 0;
   for (const auto& place : places) {

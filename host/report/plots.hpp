@@ -28,7 +28,7 @@ struct ErrorPairs {
   std::vector<double> before;
   std::vector<double> after;
   std::string unit;  ///< "mm" or "deg"
-  std::optional<double> floor;
+  std::optional<double> floor = {};
   std::string quantity = "error";          ///< of the axis: "position error"
   std::vector<std::size_t> outliers = {};  ///< ascending; marked where each pose is drawn
 };
@@ -45,8 +45,8 @@ enum class CurveStyle {
 };
 
 struct Curve {
-  std::string name;
-  std::vector<std::array<double, 2>> points;  ///< x, y
+  std::string name = {};
+  std::vector<std::array<double, 2>> points = {};  ///< x, y
   CurveStyle style = CurveStyle::usual;
   /// after, before, x, y, z; empty: by its place in the list, told apart by colour and by dashes
   std::string colour = {};
@@ -60,10 +60,10 @@ struct Curves {
   std::string described;  ///< for those who do not see it
   std::string x_name;
   std::string y_name;
-  std::vector<std::string>
-      x_texts;  ///< where x counts cases 0, 1, 2 …: their names; points are then not joined
+  /// Where x counts cases 0, 1, 2 …: their names; points are then not joined.
+  std::vector<std::string> x_texts = {};
   bool log_y = false;
-  std::vector<Curve> curves;
+  std::vector<Curve> curves = {};
   std::optional<double> floor = {};  ///< the noise, as a line across
   bool x_from_zero = false;          ///< the axis begins there, whatever the curves do
 };

@@ -3,16 +3,18 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <utility>
 
-#include "report/models.hpp"
+#include "model/effects.hpp"
 #include "report/numbers.hpp"
-#include "report/parameters.hpp"
 #include "report/plots.hpp"
 #include "report/pose_errors.hpp"
-#include "report/shown_poses.hpp"
+#include "units.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -27,7 +29,7 @@ std::vector<double> values_of(const std::vector<Observation>& rows, const std::f
 
 /// Appends it where it is not the same at every row.
 void add_covariate(PagePoses& set, PageCovariate c) {
-  const auto [low, high] = std::minmax_element(c.values.begin(), c.values.end());
+  const auto [low, high] = std::ranges::minmax_element(c.values);
   if (c.values.empty() || !(*high > *low)) return;
   set.covariates.push_back(std::move(c));
 }
@@ -41,61 +43,42 @@ void add_covariates(PagePoses& set, const std::vector<Observation>& rows) {
   add_covariate(set, time_covariate(values_of(rows, [](Row r) { return r.context.time_s; })));
   for (std::size_t k = 0; k < 3; ++k)
     add(fmt::format("force {} [N]", "xyz"[k]), [k](Row r) { return r.context.force_n[k]; });
-  const bool speeds = std::any_of(rows.begin(), rows.end(), [](Row r) {
-    return std::any_of(r.context.relative_speed.begin(), r.context.relative_speed.end(),
-                       [](double v) { return v != 0; });
+  const bool speeds = std::ranges::any_of(rows, [](Row r) {
+    return std::ranges::any_of(r.context.relative_speed, [](double v) { return v != 0; });
   });
   for (std::size_t j = 0; j < joint_count; ++j) {
-    if (speeds) {
-      add(
-          fmt::format("last motion of joint {} (1: the fastest)", j + 1),
-          [j](Row r) { return r.context.relative_speed[j]; }, false);
-    } else {
-      add(
-          fmt::format("last direction of joint {}", j + 1), [j](Row r) { return r.context.direction[j]; },
-          false);
-    }
+    const std::string name = speeds ? fmt::format("last motion of joint {} (1: the fastest)", j + 1)
+                                    : fmt::format("last direction of joint {}", j + 1);
+    const auto of = [j, speeds](Row r) {
+      return speeds ? r.context.relative_speed[j] : r.context.direction[j];
+    };
+    add(name, of, false);
   }
 }
 
-}  // namespace
-
-PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
-                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers,
-                     bool frames_fitted) {
-  PagePoses set;
-  set.before = frames_fitted ? "nominal model, frames fitted" : "nominal model";
-  set.after = "calibrated model";
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    PagePose pose;
-    pose.q_rad = rows[k].q_rad;
-    pose.line = rows[k].line;
-    for (std::size_t i = 0; i < 3; ++i) {
-      pose.before_m[i] = before[k].position_m[static_cast<Eigen::Index>(i)];
-      pose.after_m[i] = after[k].position_m[static_cast<Eigen::Index>(i)];
+/// The numbers of F and E that were fitted, under their names: "cannot be told apart" speaks of them.
+void add_frames(Page& page, const Calibration& calibration) {
+  static constexpr std::array<const char*, 6> names{"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
+  const std::array<std::pair<const char*, const Frame*>, 2> frames{
+      {{"frame_f.", &calibration.frames->f}, {"frame_e.", &calibration.frames->e}}};
+  for (const auto& [prefix, frame] : frames) {
+    const Eigen::AngleAxisd turn(frame->orientation);
+    const Eigen::Vector3d turned = turn.angle() * turn.axis();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i % 3);
+      PageParameter shown{std::string(prefix) + names[i],
+                          i < 3 ? frame->position_m[at] * 1e3 : degrees(turned[at])};
+      if (calibration.covariance) {
+        const auto& known = calibration.covariance->parameters;
+        const auto row = std::ranges::find(known, shown.name);
+        if (row == known.end()) continue;
+        const double sigma = calibration.covariance->factor.row(row - known.begin()).norm();
+        shown.sigma = i < 3 ? sigma * 1e3 : degrees(sigma);
+      }
+      page.parameters.push_back(shown);
     }
-    if (rows[k].has_orientation) {
-      pose.before_rad = before[k].orientation_rad.norm();
-      pose.after_rad = after[k].orientation_rad.norm();
-    }
-    pose.outlier = std::find(outliers.begin(), outliers.end(), k) != outliers.end();
-    set.poses.push_back(pose);
   }
-  add_covariates(set, rows);
-  return set;
 }
-
-Page titled_page(const std::string& title, const Robot& robot) {
-  Page page;
-  page.title = title;
-  page.arm = robot;
-  Calibration now;
-  stamp(now, robot);
-  page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
-  return page;
-}
-
-namespace {
 
 /// The error of the nominal arm with the frames that the summary does not have.
 void add_other_before(Page& page, const Before& before, bool frames_fitted) {
@@ -119,8 +102,7 @@ std::string gained(const ErrorStatistics& before, const ErrorStatistics& after) 
 }
 
 PageSection models_section(const std::vector<ModelFit>& compared, bool without_priors) {
-  PageSection section;
-  section.title = "Which model?";
+  PageSection section{"Which model?"};
   section.paragraphs = {fmt::format(
       "The models of the paper, each fitted anew to these rows{}. What a model gains on the rows that it is "
       "fitted to may be noise that it has learnt; what it gains on rows left out is the arm. Left out: each "
@@ -134,8 +116,7 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
       "% of the rows that are further off",
       "position error, left out [mm]",
       {},
-      true,
-      {}};
+      true};
   bool partly = false;
   for (const ModelFit& m : compared) {
     section.rows.push_back({model_words(m.kind), fmt::format("{}", m.parameters), mm_text(m.fitted.mean_m),
@@ -146,7 +127,7 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
     if (!m.left_out) continue;
     Curve curve{model_words(m.kind), {}, CurveStyle::line};
     std::vector<double> sorted = m.left_out_m;
-    std::sort(sorted.begin(), sorted.end(), std::greater<>());
+    std::ranges::sort(sorted, std::greater<>());
     const auto n = static_cast<double>(sorted.size());
     for (const std::size_t k : evenly_spaced(sorted.size(), 200))
       curve.points.push_back({100 * static_cast<double>(k) / n, sorted[k] * 1e3});
@@ -161,6 +142,53 @@ PageSection models_section(const std::vector<ModelFit>& compared, bool without_p
 }
 
 }  // namespace
+
+PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,
+                     const std::vector<Observation>& rows, const std::vector<std::size_t>& outliers,
+                     bool frames_fitted) {
+  PagePoses set;
+  set.before = frames_fitted ? "nominal model, frames fitted" : "nominal model";
+  set.after = "calibrated model";
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    PagePose pose;
+    pose.q_rad = rows[k].q_rad;
+    pose.line = rows[k].line;
+    for (std::size_t i = 0; i < 3; ++i) {
+      pose.before_m[i] = before[k].position_m[static_cast<Eigen::Index>(i)];
+      pose.after_m[i] = after[k].position_m[static_cast<Eigen::Index>(i)];
+    }
+    if (rows[k].has_orientation) {
+      pose.before_rad = before[k].orientation_rad.norm();
+      pose.after_rad = after[k].orientation_rad.norm();
+    }
+    pose.outlier = std::ranges::find(outliers, k) != outliers.end();
+    set.poses.push_back(pose);
+  }
+  add_covariates(set, rows);
+  return set;
+}
+
+Page titled_page(const std::string& title, const Robot& robot) {
+  Page page;
+  page.title = title;
+  page.arm = robot;
+  Calibration now;
+  stamp(now, robot);
+  page.made_by = fmt::format("flexcomp {}, {}", now.tool_version, now.date);
+  return page;
+}
+
+void add_parameters(Page& page, const Calibration& calibration, const Robot& robot) {
+  for (const Parameter& p : parameters_of(calibration.terms, robot.nominal)) {
+    PageParameter shown{p.name, p.get(calibration.terms) / p.si_per_file_unit()};
+    const std::vector<double>& sigmas = p.value ? calibration.value_sigma : calibration.sigma;
+    const std::size_t at = p.value ? *p.value : p.terms.front();
+    if (at < sigmas.size() && std::isfinite(sigmas[at])) shown.sigma = sigmas[at] / p.si_per_file_unit();
+    page.parameters.push_back(shown);
+  }
+  if (calibration.frames) add_frames(page, calibration);
+  for (const Confounded& c : calibration.confounded) page.confounded.push_back({c.parameter, c.with});
+}
 
 Page page_of(const Identification& r, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::vector<ModelFit>& compared, bool without_priors) {

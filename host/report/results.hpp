@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Pages of what `identify`, `validate` and `diagnose` found.
+/// Pages of what `identify`, `validate`, `diagnose` and `plan` found.
 #ifndef FLEXCOMP_HOST_REPORT_RESULTS_HPP
 #define FLEXCOMP_HOST_REPORT_RESULTS_HPP
 
@@ -12,6 +12,7 @@
 #include "diagnosis/held_out.hpp"
 #include "identification/identify.hpp"
 #include "identification/validate.hpp"
+#include "planning/plan_result.hpp"
 #include "report/models.hpp"
 #include "report/page.hpp"
 
@@ -28,6 +29,10 @@ Page page_of(const Validation& v, const std::vector<Observation>& rows, const Ro
 Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::optional<HeldOut>& others);
 
+Page page_of(const PlanTask& task, const PlanResult& result);
+
+/// Appends the parameters and the fitted frame parameters with their uncertainty, and what could not be told apart.
+void add_parameters(Page& page, const Calibration& calibration, const Robot& robot);
 /// What pages of results have in common: a page with its title and who made it when, and the rows as poses of a page.
 Page titled_page(const std::string& title, const Robot& robot);
 PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<RowResidual>& after,

@@ -16,10 +16,26 @@
 namespace flexcomp::host {
 namespace {
 
-/// Joint readings as a table, one pose per row.
+/// The criterion over the work done; empty of a search that found nothing better than its start.
+std::string plot_progress(const PagePlan& plan) {
+  Curve best{.style = CurveStyle::steps};
+  for (const auto& [work, value] : plan.progress) best.points.push_back({work / 1e3, value});
+  // What was found last held until the end.
+  if (!best.points.empty() && plan.evaluations / 1e3 > best.points.back()[0])
+    best.points.push_back({plan.evaluations / 1e3, best.points.back()[1]});
+  if (best.points.size() < 2) return "";
+  return plot_curves({.described = "Criterion of the best set of poses over the work done",
+                      .x_name = "thousand evaluations",
+                      .y_name = "criterion",
+                      .curves = {best},
+                      .x_from_zero = true});
+}
+
+}  // namespace
+
 PageSection poses_table(const std::string& title, const std::vector<std::array<double, joint_count>>& q_rad,
                         const std::vector<double>& payload_kg, int decimals) {
-  PageSection s{title, {}, {"pose"}, {}, {}};
+  PageSection s{.title = title, .columns = {"pose"}};
   for (std::size_t j = 0; j < joint_count; ++j) s.columns.push_back(fmt::format("q{} [deg]", j + 1));
   if (!payload_kg.empty()) s.columns.emplace_back("payload [kg]");
   for (std::size_t k = 0; k < q_rad.size(); ++k) {
@@ -30,26 +46,6 @@ PageSection poses_table(const std::string& title, const std::vector<std::array<d
   }
   return s;
 }
-
-/// The criterion over the work done; empty of a search that found nothing better than its start.
-std::string plot_progress(const PagePlan& plan) {
-  Curve best{"", {}, CurveStyle::steps};
-  for (const auto& [work, value] : plan.progress) best.points.push_back({work / 1e3, value});
-  // What was found last held until the end.
-  if (!best.points.empty() && plan.evaluations / 1e3 > best.points.back()[0])
-    best.points.push_back({plan.evaluations / 1e3, best.points.back()[1]});
-  if (best.points.size() < 2) return "";
-  Curves progress{"Criterion of the best set of poses over the work done",
-                  "thousand evaluations",
-                  "criterion",
-                  {},
-                  false,
-                  {best}};
-  progress.x_from_zero = true;
-  return plot_curves(progress);
-}
-
-}  // namespace
 
 std::string doubts_section(const Page& page) {
   std::vector<std::string> doubts = page.doubts;
@@ -91,19 +87,15 @@ std::string plan_sections(const PagePlan& plan) {
   PageSection expected{"What to expect",
                        {"One standard deviation of each parameter that these poses make known, for the noise "
                         "of the robot file."},
-                       {"parameter", "±", "unit"},
-                       {},
-                       {}};
+                       {"parameter", "±", "unit"}};
   for (const auto& [name, sigma] : plan.expected)
     expected.rows.push_back({name, fmt::format("{:.2g}", sigma), unit_of_name(name)});
   return free_section(
-             {"The plan",
-              {},
-              {},
-              {},
-              {{plot_coverage(plan),
-                fmt::format("Where the poses lie between the limits of each joint{}", higher)},
-               {plot_progress(plan), "The criterion of the best set so far, over the work done."}}}) +
+             {.title = "The plan",
+              .figures = {{plot_coverage(plan),
+                           fmt::format("Where the poses lie between the limits of each joint{}", higher)},
+                          {plot_progress(plan),
+                           "The criterion of the best set so far, over the work done."}}}) +
          free_section(poses_table("Planned poses", plan.q_rad, plan.payload_kg, 3)) + free_section(expected);
 }
 

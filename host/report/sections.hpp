@@ -4,8 +4,10 @@
 #ifndef FLEXCOMP_HOST_REPORT_SECTIONS_HPP
 #define FLEXCOMP_HOST_REPORT_SECTIONS_HPP
 
+#include <array>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "report/page.hpp"
 
@@ -19,6 +21,9 @@ std::string facts_list(const Page& page);
 std::string poses_section(const PagePoses& set, std::size_t number, std::size_t sets);
 std::string plan_sections(const PagePlan& plan);
 std::string free_section(const PageSection& section);
+/// Joint readings as a table, one pose per row. \param payload_kg  of each, or empty
+PageSection poses_table(const std::string& title, const std::vector<std::array<double, joint_count>>& q_rad,
+                        const std::vector<double>& payload_kg, int decimals);
 std::string results_section(const Page& page);
 /// Parameters that cannot be told from others, and those that these data do not determine.
 std::string identifiability_sections(const Page& page);

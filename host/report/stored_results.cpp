@@ -30,9 +30,8 @@ ErrorColumns columns_of(const CsvTable& table) {
   ErrorColumns c;
   for (std::size_t j = 0; j < joint_count; ++j)
     c.q[j] = table.require(fmt::format("q{}_deg", j + 1), "joint readings");
-  c.d[0] = table.require("dx_mm", "the position error");
-  c.d[1] = table.require("dy_mm", "the position error");
-  c.d[2] = table.require("dz_mm", "the position error");
+  for (std::size_t i = 0; i < 3; ++i)
+    c.d[i] = table.require(fmt::format("d{}_mm", "xyz"[i]), "the position error");
   c.turned = table.find("distance_deg");
   return c;
 }

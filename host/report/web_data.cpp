@@ -15,7 +15,6 @@
 #include "report/axis.hpp"
 #include "report/plots.hpp"
 #include "report/pose_errors.hpp"
-#include "report/shown_poses.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -63,14 +62,12 @@ Json joints(const std::vector<std::array<double, joint_count>>& poses) {
 }
 
 Json bodies(const std::vector<Capsule>& capsules) {
-  Json list = Json::array();
-  for (const Capsule& c : capsules) {
-    list.push_back({{"frame", c.frame},
-                    {"from", numbers(c.from_m)},
-                    {"to", numbers(c.to_m)},
-                    {"radius", short_number(c.radius_m)}});
-  }
-  return list;
+  return json_list(capsules, [](const Capsule& c) -> Json {
+    return {{"frame", c.frame},
+            {"from", numbers(c.from_m)},
+            {"to", numbers(c.to_m)},
+            {"radius", short_number(c.radius_m)}};
+  });
 }
 
 Json arm_json(const Robot& robot) {
@@ -79,8 +76,7 @@ Json arm_json(const Robot& robot) {
     arm["links"].push_back({l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad});
   arm["tool"] = robot.nominal.tool_xyz_m;
   arm["tool_wxyz"] = robot.nominal.tool_wxyz;
-  arm["reflectors"] = Json::array();
-  for (const Eigen::Vector3d& p : robot.reflectors_m) arm["reflectors"].push_back(numbers(p));
+  arm["reflectors"] = json_list(robot.reflectors_m, numbers);
   return arm;
 }
 
@@ -108,9 +104,8 @@ Json histogram_json(const std::vector<const std::vector<double>*>& lists, bool l
     scale.low = std::min(scale.low, 0.0);
     if (!(scale.high > scale.low)) scale.high = scale.low + 1;
   }
-  Json j{{"log", log}, {"low", scale.low}, {"high", scale.high}, {"counts", Json::array()}};
-  for (const auto* list : lists) j["counts"].push_back(histogram(*list, scale, bin_count(list->size())));
-  return j;
+  const auto counts = [&](const auto* list) { return histogram(*list, scale, bin_count(list->size())); };
+  return {{"log", log}, {"low", scale.low}, {"high", scale.high}, {"counts", json_list(lists, counts)}};
 }
 
 /// Of one quantity: before and after together and each alone, on either axis.
@@ -153,9 +148,7 @@ Json covariate_json(const PageCovariate& c, const std::vector<std::size_t>& rows
 }
 
 Json counted(const std::vector<double>& values, const std::vector<std::size_t>& rows, double unit) {
-  Json list = Json::array();
-  for (const std::size_t k : rows) list.push_back(counted(values[k], unit));
-  return list;
+  return json_list(rows, [&](std::size_t k) { return counted(values[k], unit); });
 }
 
 /// Which poses of the data these are: their numbers where some are left out, their lines where they are known.
@@ -170,7 +163,7 @@ void add_places(Json& j, const std::vector<PagePose>& poses, const std::vector<s
   }
   if (rows.size() < poses.size()) j["number"] = number;
   // A file without gaps is its first line and a count.
-  const bool lines = std::all_of(poses.begin(), poses.end(), [](const PagePose& p) { return p.line > 0; });
+  const bool lines = std::ranges::all_of(poses, [](const PagePose& p) { return p.line > 0; });
   if (lines && gapless && !rows.empty()) {
     j["first_line"] = poses[rows[0]].line - rows[0];
   } else if (lines) {
@@ -222,8 +215,8 @@ Json set_json(const PagePoses& set, std::size_t limit) {
       j["histograms"][std::string(1, "xyz"[i])] = histograms(component[i], true);
     if (!angle.before.empty()) j["histograms"]["turned"] = histograms(angle, false);
   }
-  j["covariates"] = Json::array();
-  for (const PageCovariate& c : set.covariates) j["covariates"].push_back(covariate_json(c, rows));
+  j["covariates"] =
+      json_list(set.covariates, [&](const PageCovariate& c) { return covariate_json(c, rows); });
   if (set.frames) {
     const Eigen::Matrix3d turn = set.frames->f.orientation.toRotationMatrix().transpose();
     j["turn"] = {numbers(turn.row(0)), numbers(turn.row(1)), numbers(turn.row(2))};

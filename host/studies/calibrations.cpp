@@ -67,13 +67,22 @@ std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<Stu
   return rows;
 }
 
+std::vector<Eigen::Vector3d> position_errors_m(const StudiedArm& arm, const TermSet& terms,
+                                               const std::vector<Observation>& rows) {
+  const auto model = prepare(terms, arm.robot, arm.name);
+  Workspace<double, joint_count> ws;
+  std::vector<Eigen::Vector3d> errors;
+  for (const Observation& row : rows)
+    errors.emplace_back(row.p_m - forward(*model, row.q_rad, row.context, ws).position);
+  return errors;
+}
+
 Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                        const ExperimentOptions& options)
     : arm_(arm), options_(options), clean_(clean_rows(arm, poses, options.orientations, options.noise)) {
   const ParametricModel paper = paper_model(arm.robot.nominal, options.model, true);
   start_.set = paper.set;
-  Unknowns all;
-  all.parameters = paper.parameters;
+  Unknowns all{.parameters = paper.parameters};
   all.prior =
       prior_knowledge(paper.set, all.parameters, options.method == Estimation::ours, options.tolerances);
   const Identifiability identifiability =
@@ -92,25 +101,19 @@ Experiment::Experiment(const StudiedArm& arm, const std::vector<StudiedPose>& po
   // True values of the fitted parameters: noise-free fit of the complete model at poses that identify it.
   Unknowns complete;
   ParametricModel full = paper_model(arm.robot.nominal, ModelKind::full, true);
-  Estimate nominal;
-  nominal.set = full.set;
+  Estimate nominal{.set = full.set};
   const std::vector<Observation> many = clean_rows(
       arm, random_poses(arm, 60, 2, {0.5 * arm.robot.nominal.payload_kg, arm.robot.nominal.payload_kg}),
       options.orientations, options.noise);
-  Unknowns every;
-  every.parameters = full.parameters;
+  Unknowns every{.parameters = full.parameters};
   const Elimination possible = possible_columns(arm.robot, many, nominal, every, structure_seed);
   for (const std::size_t c : possible.kept) complete.parameters.push_back(every.parameters[c]);
-  EstimatorOptions exact;
-  exact.robust = false;
-  const Fit without_noise = fit(nominal, complete, many, arm.robot, exact);
+  const Fit without_noise = fit(nominal, complete, many, arm.robot, {.robust = false});
   if (!without_noise.converged) throw std::runtime_error("the noise-free fit did not converge");
   at_truth_ = without_noise.estimate;
   truth_.resize(static_cast<Eigen::Index>(unknowns_.parameters.size()));
   for (std::size_t p = 0; p < unknowns_.parameters.size(); ++p) {
-    const auto same = std::find_if(every.parameters.begin(), every.parameters.end(), [&](const Parameter& q) {
-      return q.name == unknowns_.parameters[p].name;
-    });
+    const auto same = std::ranges::find(every.parameters, unknowns_.parameters[p].name, &Parameter::name);
     truth_[static_cast<Eigen::Index>(p)] = same->get(at_truth_.set);
   }
 }
@@ -129,9 +132,8 @@ Estimate Experiment::calibrate(std::uint64_t seed) const {
 
 Estimate Experiment::from(const std::vector<Observation>& measured) const {
   if (options_.method == Estimation::m_lm || options_.method == Estimation::ours) {
-    EstimatorOptions how;
-    how.robust = options_.method == Estimation::ours;
-    return fit(start_, unknowns_, measured, arm_.robot, how).estimate;
+    const bool robust = options_.method == Estimation::ours;
+    return fit(start_, unknowns_, measured, arm_.robot, {.robust = robust}).estimate;
   }
   std::vector<Observation> rows = measured;
   if (options_.method == Estimation::unweighted) {
@@ -163,8 +165,7 @@ Eigen::MatrixXd Experiment::cramer_rao() const {
   Unknowns there;
   const ParametricModel full = paper_model(arm_.robot.nominal, ModelKind::full, true);
   for (const Parameter& p : unknowns_.parameters) {
-    there.parameters.push_back(*std::find_if(full.parameters.begin(), full.parameters.end(),
-                                             [&](const Parameter& q) { return q.name == p.name; }));
+    there.parameters.push_back(*std::ranges::find(full.parameters, p.name, &Parameter::name));
   }
   const Eigen::MatrixXd j = linearised(at_truth_, *model, clean_, there).derivative;
   const Eigen::VectorXd units = units_of(there, at_truth_.set);

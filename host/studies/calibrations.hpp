@@ -33,7 +33,7 @@ struct ExperimentOptions {
   ModelKind model = ModelKind::full;
   Estimation method = Estimation::m_lm;
   NoiseLevel noise = noise_n1;
-  std::vector<Tolerance> tolerances;
+  std::vector<Tolerance> tolerances = {};
   /// True: fit all parameters that random poses of this kind identify, also those that these poses do not
   /// (least squares then give the minimum-norm solution). False: those that analyse_identifiability() selects.
   bool fit_all = false;
@@ -86,6 +86,10 @@ class Experiment {
 /// Noise-free rows of an arm; the whitening is that of the noise level.
 std::vector<Observation> clean_rows(const StudiedArm& arm, const std::vector<StudiedPose>& poses,
                                     bool orientations, const NoiseLevel& noise);
+
+/// True position of each row less the position of an arm with these terms, m.
+std::vector<Eigen::Vector3d> position_errors_m(const StudiedArm& arm, const TermSet& terms,
+                                               const std::vector<Observation>& rows);
 
 /// Runs work(k) for k = 0 … count - 1 on all cores; the results do not depend on their number.
 void for_each_repeat(std::size_t count, const std::function<void(std::size_t)>& work);

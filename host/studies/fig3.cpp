@@ -18,11 +18,10 @@ bool is_geometric(const std::string& name) {
 }  // namespace
 
 Study study_fig3(const StudyOptions& options) {
-  Study study;
-  study.name = "fig3";
-  study.title = "Fig. 3: the geometric parameters by model, without noise";
-  study.quantity = "mean score of the geometric parameters (1 is perfect)";
-  study.label_names = {"arm", "model", "parameters"};
+  Study study{"fig3",
+              "Fig. 3: the geometric parameters by model, without noise",
+              "mean score of the geometric parameters (1 is perfect)",
+              {"arm", "model", "parameters"}};
   struct Model {
     ModelKind kind;
     const char* name;
@@ -34,17 +33,14 @@ Study study_fig3(const StudyOptions& options) {
                                   {ModelKind::geometric, "geometric", {}}};
   for (const StudiedArm& arm : options.arms) {
     const std::vector<StudiedPose> poses = random_poses(arm, 14, options.seed);
-    Curves curves;
-    curves.described = "Score of each geometric parameter by model, " + arm.name;
-    curves.x_name = "geometric parameter, in the order of the chain";
-    curves.y_name = "score";
+    Curves curves{.described = "Score of each geometric parameter by model, " + arm.name,
+                  .x_name = "geometric parameter, in the order of the chain",
+                  .y_name = "score"};
     for (const Model& model : models) {
-      ExperimentOptions how;
-      how.model = model.kind;
       // Weights as of N1; nothing is added to the rows.
-      const Experiment experiment(arm, poses, how);
+      const Experiment experiment(arm, poses, {.model = model.kind});
       const Eigen::VectorXd scores = experiment.scores(experiment.calibrate_without_noise());
-      Curve curve{fmt::format("{} ({})", model.name, experiment.fitted()), {}};
+      Curve curve{fmt::format("{} ({})", model.name, experiment.fitted())};
       double sum = 0;
       double count = 0;
       std::string wrong;
@@ -57,12 +53,10 @@ Study study_fig3(const StudyOptions& options) {
         if (s < 0.5) wrong += (wrong.empty() ? "" : ", ") + experiment.parameters()[p].name;
       }
       curves.curves.push_back(curve);
-      StudyRow row;
-      row.labels = {arm.name, model.name, fmt::format("{}", experiment.fitted())};
-      row.paper = model.paper;
-      row.ours = sum / count;
-      row.remark = wrong.empty() ? "" : "off by half or more: " + wrong;
-      study.rows.push_back(row);
+      study.rows.push_back({.labels = {arm.name, model.name, fmt::format("{}", experiment.fitted())},
+                            .paper = model.paper,
+                            .ours = sum / count,
+                            .remark = wrong.empty() ? "" : "off by half or more: " + wrong});
     }
     study.figures.push_back({arm.name + ": every geometric parameter.", curves});
     study.notes.push_back(arm.about);

@@ -45,11 +45,10 @@ std::vector<StudiedPose> settled_poses(const StudiedArm& arm, std::size_t count,
 Study study_fig4(const StudyOptions& options) {
   constexpr std::size_t count = 14;
   constexpr std::uint64_t pose_sets = 20;  // the score varies from set to set
-  Study study;
-  study.name = "fig4";
-  study.title = "Fig. 4: pose model and position model, orientations varied and settled";
-  study.quantity = "mean score of the parameters (1 is perfect)";
-  study.label_names = {"arm", "noise", "orientations", "model", "known"};
+  Study study{"fig4",
+              "Fig. 4: pose model and position model, orientations varied and settled",
+              "mean score of the parameters (1 is perfect)",
+              {"arm", "noise", "orientations", "model", "known"}};
   struct Case {
     const char* model;
     bool orientations;
@@ -80,13 +79,9 @@ Study study_fig4(const StudyOptions& options) {
         std::vector<double> scores;
         for (std::uint64_t set = 0; set < pose_sets; ++set) {
           const std::uint64_t seed = options.seed * 1000 + set;
-          ExperimentOptions how;
-          how.orientations = c.orientations;
-          how.method = c.method;
-          how.noise = noise;
-          how.fit_all = true;
           const Experiment experiment(
-              arm, c.settled ? settled_poses(arm, count, seed) : random_poses(arm, count, seed), how);
+              arm, c.settled ? settled_poses(arm, count, seed) : random_poses(arm, count, seed),
+              {.orientations = c.orientations, .method = c.method, .noise = noise, .fit_all = true});
           const Score s = repeated_score(experiment, repeats_each, seed);
           scores.push_back(s.mean);
           score += s.mean / pose_sets;
@@ -96,12 +91,11 @@ Study study_fig4(const StudyOptions& options) {
           known = wanted - experiment.missing().size();
         }
         for (const double s : scores) between += (s - score) * (s - score) / (pose_sets - 1);
-        StudyRow row;
-        row.labels = {arm.name, noise.name, c.settled ? "settled" : "varied", c.model,
-                      fmt::format("{} of {}", known, wanted)};
+        StudyRow row{.labels = {arm.name, noise.name, c.settled ? "settled" : "varied", c.model,
+                                fmt::format("{} of {}", known, wanted)},
+                     .ours = score,
+                     .uncertainty = std::sqrt(between / pose_sets)};
         if (arm.name == "TX60L" && std::string(noise.name) == "N1") row.paper = c.paper;
-        row.ours = score;
-        row.uncertainty = std::sqrt(between / pose_sets);
         if (!c.settled && c.method == Estimation::m_lm) row.limit = limit;
         if (c.settled) {
           row.remark = "not identifiable: `identify` exits with 5 and suggests poses";

@@ -28,35 +28,29 @@ struct Case {
 struct Variation {
   const char* name;
   std::size_t poses = 14;
-  std::vector<double> payloads_kg;  // empty: the arm's
-  double tool_length = 1;           // times as far from the flange
+  std::vector<double> payloads_kg = {};  // empty: the arm's
+  double tool_length = 1;                // times as far from the flange
   bool tolerances = false;
 };
 
 /// Typical tolerances of a drawing, independent of the truth.
 std::vector<Tolerance> typical_tolerances() {
-  std::vector<Tolerance> list;
-  const auto add = [&](const char* pattern, double expected, double sigma) {
-    list.push_back({pattern, expected, sigma, "fig8", 0});
-  };
-  add("link*.theta_deg", 0, 0.1);
-  add("link*.d_mm", 0, 0.3);
-  add("link*.a_mm", 0, 0.1);
-  add("link*.alpha_deg", 0, 0.05);
-  add("link*.beta_deg", 0, 0.05);
-  return list;
+  return {{"link*.theta_deg", 0, 0.1, "fig8", 0},
+          {"link*.d_mm", 0, 0.3, "fig8", 0},
+          {"link*.a_mm", 0, 0.1, "fig8", 0},
+          {"link*.alpha_deg", 0, 0.05, "fig8", 0},
+          {"link*.beta_deg", 0, 0.05, "fig8", 0}};
 }
 
 StudyRow row_of(const StudiedArm& arm, const NoiseLevel& noise, const std::string& poses,
                 const std::string& estimator, const Experiment& experiment, const Score& score,
                 bool has_limit) {
-  StudyRow row;
-  row.labels = {arm.name, noise.name, poses, estimator};
-  row.ours = score.mean;
-  row.uncertainty = score.error_of_mean();
+  StudyRow row{.labels = {arm.name, noise.name, poses, estimator},
+               .ours = score.mean,
+               .uncertainty = score.error_of_mean(),
+               .remark = fmt::format("{} parameters, 1 % after {:.0f} repeats", experiment.fitted(),
+                                     score.repeats_for_one_percent())};
   if (has_limit) row.limit = experiment.cramer_rao_score();
-  row.remark = fmt::format("{} parameters, 1 % after {:.0f} repeats", experiment.fitted(),
-                           score.repeats_for_one_percent());
   return row;
 }
 
@@ -96,18 +90,16 @@ StudyRow chosen_draw_row(const StudiedArm& arm, const NoiseLevel& noise,
   const Experiment experiment(arm, poses, ExperimentOptions());
   const Eigen::VectorXd errors = errors_at_the_chosen_draw(arm, poses, seed, experiment.parameters()) *
                                  (noise.position_sigma_m / noise_n1.position_sigma_m);
-  StudyRow row;
-  row.labels = {arm.name, noise.name, "SAPSO (paper's proposal)",
-                "least squares, on the noise it was chosen with"};
-  row.ours = (1 - errors.array().abs() / experiment.truth().array().abs()).max(0.0).mean();
-  row.remark = "one draw of noise, not a mean; see below";
-  return row;
+  return {.labels = {arm.name, noise.name, "SAPSO (paper's proposal)",
+                     "least squares, on the noise it was chosen with"},
+          .ours = (1 - errors.array().abs() / experiment.truth().array().abs()).max(0.0).mean(),
+          .remark = "one draw of noise, not a mean; see below"};
 }
 
 /// Scores and limits of the rows from `first` on.
 void add_curves(const Study& study, std::size_t first, const NoiseLevel& noise, Curves& curves) {
-  Curve ours{fmt::format("{} reached", noise.name), {}};
-  Curve limit{fmt::format("{} limit", noise.name), {}};
+  Curve ours{fmt::format("{} reached", noise.name)};
+  Curve limit{fmt::format("{} limit", noise.name)};
   for (std::size_t k = first; k < study.rows.size(); ++k) {
     const double at = static_cast<double>(k - first + 1);
     ours.points.push_back({at, *study.rows[k].ours});
@@ -120,11 +112,10 @@ void add_curves(const Study& study, std::size_t first, const NoiseLevel& noise, 
 }  // namespace
 
 Study study_fig8(const StudyOptions& options) {
-  Study study;
-  study.name = "fig8";
-  study.title = "Fig. 8: planned poses and M-LM against DETMAX and least squares";
-  study.quantity = "mean score of the parameters (1 is perfect)";
-  study.label_names = {"arm", "noise", "14 poses by", "estimator"};
+  Study study{"fig8",
+              "Fig. 8: planned poses and M-LM against DETMAX and least squares",
+              "mean score of the parameters (1 is perfect)",
+              {"arm", "noise", "14 poses by", "estimator"}};
   const std::vector<Case> cases{
       {"SAPSO (paper's proposal)", "M-LM", Planning::sapso, Estimation::m_lm, 0.958, 0.927},
       {"SAPSO", "least squares", Planning::sapso, Estimation::least_squares, {}, {}},
@@ -138,27 +129,23 @@ Study study_fig8(const StudyOptions& options) {
   for (const StudiedArm& arm : options.arms) {
     const double payload = arm.robot.nominal.payload_kg;
     const std::vector<Variation> variations{
-        {"our plan, two payloads", 14, {payload, 5 * payload}, 1, false},
-        {"our plan, tool 3 times as long", 14, {}, 3, false},
+        {"our plan, two payloads", 14, {payload, 5 * payload}},
+        {"our plan, tool 3 times as long", 14, {}, 3},
         {"our plan, tolerances as priors", 14, {}, 1, true},
-        {"our plan, 40 poses", 40, {}, 1, false},
+        {"our plan, 40 poses", 40},
         {"our plan, 40 poses, two payloads, long tool", 40, {payload, 5 * payload}, 3, true},
     };
     options.report(arm.name + ": planning", 0);
     const auto [planned, varied] = make_plans(arm, cases, variations, options.seed);
     options.report(arm.name + ": calibrating", 0.5);
-    Curves curves;
-    curves.described = "Score by method and noise, " + arm.name;
-    curves.x_name = "row of the table";
-    curves.y_name = "score";
+    Curves curves{.described = "Score by method and noise, " + arm.name,
+                  .x_name = "row of the table",
+                  .y_name = "score"};
     for (const NoiseLevel& noise : options.noises) {
       const bool n1 = noise.position_sigma_m == noise_n1.position_sigma_m;
       const std::size_t first = study.rows.size();
       for (const Case& c : cases) {
-        ExperimentOptions how;
-        how.method = c.method;
-        how.noise = noise;
-        const Experiment experiment(arm, planned.at(c.planning), how);
+        const Experiment experiment(arm, planned.at(c.planning), {.method = c.method, .noise = noise});
         study.rows.push_back(row_of(arm, noise, c.poses, c.estimator, experiment,
                                     repeated_score(experiment, options.repeats, options.seed), true));
         study.rows.back().remark +=
@@ -167,9 +154,7 @@ Study study_fig8(const StudyOptions& options) {
       }
       study.rows.push_back(chosen_draw_row(arm, noise, planned.at(Planning::sapso), options.seed));
       for (std::size_t v = 0; v < variations.size(); ++v) {
-        ExperimentOptions how;
-        how.method = Estimation::ours;
-        how.noise = noise;
+        ExperimentOptions how{.method = Estimation::ours, .noise = noise};
         if (variations[v].tolerances) how.tolerances = typical_tolerances();
         const Experiment experiment(varied[v].first, varied[v].second, how);
         study.rows.push_back(row_of(arm, noise, variations[v].name, "our default", experiment,

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
@@ -108,17 +109,23 @@ StudiedArm scaled_to(const StudiedArm& arm, double mean_error_m, const std::vect
   return scaled;
 }
 
-double mean_error_before_m(const StudiedArm& arm, const std::vector<StudiedPose>& poses) {
-  const auto truth = prepare(arm.truth, arm.robot, arm.name);
+std::vector<double> errors_before_m(const StudiedArm& arm, const TermSet& truth,
+                                    const std::vector<StudiedPose>& poses) {
+  const auto model = prepare(truth, arm.robot, arm.name);
   auto context = default_context<double>(arm.robot.nominal);
   Workspace<double, joint_count> ws;
-  double sum = 0;
+  std::vector<double> errors;
   for (const StudiedPose& pose : poses) {
     context.payload_kg = pose.payload_kg;
-    sum += (forward(*truth, pose.q_rad, context, ws).position - nominal_forward(*truth, pose.q_rad).position)
-               .norm();
+    const Eigen::Vector3d reached = forward(*model, pose.q_rad, context, ws).position;
+    errors.push_back((reached - nominal_forward(*model, pose.q_rad).position).norm());
   }
-  return sum / static_cast<double>(poses.size());
+  return errors;
+}
+
+double mean_error_before_m(const StudiedArm& arm, const std::vector<StudiedPose>& poses) {
+  const std::vector<double> errors = errors_before_m(arm, arm.truth, poses);
+  return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(poses.size());
 }
 
 std::vector<StudiedPose> random_poses(const StudiedArm& arm, std::size_t count, std::uint64_t seed,

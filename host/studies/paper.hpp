@@ -39,7 +39,11 @@ StudiedArm paper_rx160l();
 /// Scales all errors of an arm but its compliances to a mean position error of the nominal arm.
 StudiedArm scaled_to(const StudiedArm& arm, double mean_error_m, const std::vector<StudiedPose>& poses);
 
-/// Mean position error of the nominal arm at the origin of Ftool, m.
+/// Distances between the positions of a true arm and the nominal one at the origin of Ftool, m.
+std::vector<double> errors_before_m(const StudiedArm& arm, const TermSet& truth,
+                                    const std::vector<StudiedPose>& poses);
+
+/// Their mean with all errors of the arm.
 double mean_error_before_m(const StudiedArm& arm, const std::vector<StudiedPose>& poses);
 
 /// Random poses, uniform within the limits, payloads in turn (none given: the robot's).

@@ -2,7 +2,6 @@
 // Gain of the flexible model over the payload: the paper says that it grows.
 #include <fmt/format.h>
 
-#include "flexcomp/forward.hpp"
 #include "studies/calibrations.hpp"
 #include "studies/planned.hpp"
 #include "studies/study.hpp"
@@ -16,12 +15,9 @@ double mean_residual_m(const StudiedArm& arm, const Experiment& experiment,
                        const std::vector<Observation>& others, const StudyOptions& options) {
   std::vector<double> residual(options.repeats);
   for_each_repeat(options.repeats, [&](std::size_t k) {
-    const auto model = prepare(experiment.calibrate((options.seed << 32) + k).set, arm.robot, arm.name);
-    Workspace<double, joint_count> ws;
-    for (const Observation& row : others) {
-      residual[k] += (row.p_m - forward(*model, row.q_rad, row.context, ws).position).norm() /
-                     static_cast<double>(others.size());
-    }
+    const TermSet terms = experiment.calibrate((options.seed << 32) + k).set;
+    for (const Eigen::Vector3d& error : position_errors_m(arm, terms, others))
+      residual[k] += error.norm() / static_cast<double>(others.size());
   });
   double sum = 0;
   for (const double v : residual) sum += v / static_cast<double>(options.repeats);
@@ -31,20 +27,18 @@ double mean_residual_m(const StudiedArm& arm, const Experiment& experiment,
 }  // namespace
 
 Study study_payload(const StudyOptions& options) {
-  Study study;
-  study.name = "payload";
-  study.title = "Gain of the flexible model over the payload";
-  study.quantity = "mean score of the parameters (1 is perfect)";
-  study.label_names = {"arm", "noise", "payload [kg]", "rigid-flexible [mm]", "geometric [mm]", "gain"};
+  Study study{"payload",
+              "Gain of the flexible model over the payload",
+              "mean score of the parameters (1 is perfect)",
+              {"arm", "noise", "payload [kg]", "rigid-flexible [mm]", "geometric [mm]", "gain"}};
   for (const StudiedArm& given : options.arms) {
-    Curves curves;
-    curves.described = "Mean error on other poses over the payload, " + given.name;
-    curves.x_name = "payload [kg]";
-    curves.y_name = "mm";
-    curves.log_y = true;
+    Curves curves{.described = "Mean error on other poses over the payload, " + given.name,
+                  .x_name = "payload [kg]",
+                  .y_name = "mm",
+                  .log_y = true};
     for (const NoiseLevel& noise : options.noises) {
-      Curve flexible{fmt::format("{} rigid-flexible", noise.name), {}};
-      Curve rigid{fmt::format("{} geometric", noise.name), {}};
+      Curve flexible{fmt::format("{} rigid-flexible", noise.name)};
+      Curve rigid{fmt::format("{} geometric", noise.name)};
       double done = 0;
       for (const double payload : {0.5, 1.1, 3.0, 5.0}) {
         options.report(fmt::format("{} {}: {} kg", given.name, noise.name, payload), done++ / 4);
@@ -53,27 +47,19 @@ Study study_payload(const StudyOptions& options) {
         const std::vector<StudiedPose> poses = planned_poses(arm, 14, Planning::ours, options.seed);
         const std::vector<Observation> others =
             clean_rows(arm, random_poses(arm, 100, options.seed + 1000), true, noise);
-        ExperimentOptions how;
-        how.method = Estimation::ours;
-        how.noise = noise;
-        how.fit_all = true;
+        ExperimentOptions how{.method = Estimation::ours, .noise = noise, .fit_all = true};
         const Experiment full(arm, poses, how);
         how.model = ModelKind::geometric;
         const Experiment geometric(arm, poses, how);
         const Score score = repeated_score(full, options.repeats, options.seed);
         const double full_mm = mean_residual_m(arm, full, others, options) * 1e3;
         const double geometric_mm = mean_residual_m(arm, geometric, others, options) * 1e3;
-        StudyRow row;
-        row.labels = {arm.name,
-                      noise.name,
-                      fmt::format("{:g}", payload),
-                      fmt::format("{:.4f}", full_mm),
-                      fmt::format("{:.4f}", geometric_mm),
-                      fmt::format("{:.2f}", geometric_mm / full_mm)};
-        row.ours = score.mean;
-        row.uncertainty = score.error_of_mean();
-        row.limit = full.cramer_rao_score();
-        study.rows.push_back(row);
+        study.rows.push_back(
+            {.labels = {arm.name, noise.name, fmt::format("{:g}", payload), fmt::format("{:.4f}", full_mm),
+                        fmt::format("{:.4f}", geometric_mm), fmt::format("{:.2f}", geometric_mm / full_mm)},
+             .ours = score.mean,
+             .uncertainty = score.error_of_mean(),
+             .limit = full.cramer_rao_score()});
         flexible.points.push_back({payload, full_mm});
         rigid.points.push_back({payload, geometric_mm});
       }

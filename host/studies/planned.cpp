@@ -88,8 +88,7 @@ Eigen::VectorXd errors_at_the_chosen_draw(const StudiedArm& arm, const std::vect
   const std::vector<std::string>& names = problem.information->names();
   Eigen::VectorXd errors(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t p = 0; p < parameters.size(); ++p) {
-    const auto at =
-        static_cast<std::size_t>(std::find(names.begin(), names.end(), parameters[p].name) - names.begin());
+    const auto at = static_cast<std::size_t>(std::ranges::find(names, parameters[p].name) - names.begin());
     errors[static_cast<Eigen::Index>(p)] = in_units[static_cast<Eigen::Index>(at)] *
                                            problem.information->file_units()[at] *
                                            parameters[p].si_per_file_unit();

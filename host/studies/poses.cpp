@@ -9,11 +9,10 @@
 namespace flexcomp::host {
 
 Study study_poses(const StudyOptions& options) {
-  Study study;
-  study.name = "poses";
-  study.title = "Score over the number of poses";
-  study.quantity = "mean score of the parameters (1 is perfect)";
-  study.label_names = {"arm", "noise", "poses", "chosen"};
+  Study study{"poses",
+              "Score over the number of poses",
+              "mean score of the parameters (1 is perfect)",
+              {"arm", "noise", "poses", "chosen"}};
   const std::vector<std::size_t> counts{8, 10, 12, 14, 16, 20, 24, 30, 40};
   for (const StudiedArm& arm : options.arms) {
     std::vector<std::vector<StudiedPose>> planned;
@@ -22,34 +21,27 @@ Study study_poses(const StudyOptions& options) {
                      static_cast<double>(planned.size()) / static_cast<double>(counts.size()));
       planned.push_back(planned_poses(arm, n, Planning::ours, options.seed));
     }
-    Curves curves;
-    curves.described = "Score over the number of poses, " + arm.name;
-    curves.x_name = "poses";
-    curves.y_name = "score";
+    Curves curves{
+        .described = "Score over the number of poses, " + arm.name, .x_name = "poses", .y_name = "score"};
     for (const NoiseLevel& noise : options.noises) {
-      Curve ours{fmt::format("{} planned", noise.name), {}};
+      Curve ours{fmt::format("{} planned", noise.name)};
       std::size_t least_identifying = 0;
-      Curve limit{fmt::format("{} limit", noise.name), {}};
-      Curve random{fmt::format("{} random", noise.name), {}};
+      Curve limit{fmt::format("{} limit", noise.name)};
+      Curve random{fmt::format("{} random", noise.name)};
       double at_14 = 0;
       double before_14 = 0;
       double after_14 = 0;
       for (std::size_t k = 0; k < counts.size(); ++k) {
         for (const bool is_planned : {true, false}) {
-          ExperimentOptions how;
-          how.method = Estimation::ours;
-          how.noise = noise;
-          how.fit_all = true;
           const Experiment experiment(
               arm, is_planned ? planned[k] : planned_poses(arm, counts[k], Planning::random, options.seed),
-              how);
+              {.method = Estimation::ours, .noise = noise, .fit_all = true});
           const Score score = repeated_score(experiment, options.repeats, options.seed);
-          StudyRow row;
-          row.labels = {arm.name, noise.name, fmt::format("{}", counts[k]),
-                        is_planned ? "planned" : "random"};
-          row.ours = score.mean;
-          row.uncertainty = score.error_of_mean();
-          row.limit = experiment.cramer_rao_score();
+          StudyRow row{.labels = {arm.name, noise.name, fmt::format("{}", counts[k]),
+                                  is_planned ? "planned" : "random"},
+                       .ours = score.mean,
+                       .uncertainty = score.error_of_mean(),
+                       .limit = experiment.cramer_rao_score()};
           if (!experiment.missing().empty())
             row.remark = fmt::format("{} parameters not identifiable", experiment.missing().size());
           study.rows.push_back(row);

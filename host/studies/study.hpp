@@ -18,12 +18,12 @@ namespace flexcomp::host {
 
 /// One result; fields without a value are empty.
 struct StudyRow {
-  std::vector<std::string> labels;  ///< one per name in Study::label_names
-  std::optional<double> paper;      ///< printed figure
-  std::optional<double> ours;
-  std::optional<double> uncertainty;  ///< standard deviation of `ours`, a mean over repeats
-  std::optional<double> limit;        ///< the Cramér-Rao limit of the same quantity
-  std::string remark;
+  std::vector<std::string> labels;   ///< one per name in Study::label_names
+  std::optional<double> paper = {};  ///< printed figure
+  std::optional<double> ours = {};
+  std::optional<double> uncertainty = {};  ///< standard deviation of `ours`, a mean over repeats
+  std::optional<double> limit = {};        ///< the Cramér-Rao limit of the same quantity
+  std::string remark = {};
 };
 
 struct StudyFigure {
@@ -37,9 +37,9 @@ struct Study {
   std::string title;     ///< subject
   std::string quantity;  ///< "score (1 is perfect)", "mean position error [mm]"
   std::vector<std::string> label_names;
-  std::vector<StudyRow> rows;
-  std::vector<std::string> notes;  ///< set-up, result, and limits of the printed figure
-  std::vector<StudyFigure> figures;
+  std::vector<StudyRow> rows = {};
+  std::vector<std::string> notes = {};  ///< set-up, result, and limits of the printed figure
+  std::vector<StudyFigure> figures = {};
 };
 
 struct StudyOptions {

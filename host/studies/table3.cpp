@@ -9,7 +9,6 @@
 #include <random>
 #include <utility>
 
-#include "flexcomp/forward.hpp"
 #include "linalg/decompositions.hpp"
 #include "studies/calibrations.hpp"
 #include "studies/planned.hpp"
@@ -48,13 +47,10 @@ struct ResidualError {
 ResidualError residual_error(const StudiedArm& arm, const TermSet& estimate,
                              const std::vector<Observation>& others, const NoiseLevel& noise,
                              std::uint64_t seed) {
-  const auto model = prepare(estimate, arm.robot, arm.name);
-  Workspace<double, joint_count> ws;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, noise.position_sigma_m);
   ResidualError residual;
-  for (const Observation& row : others) {
-    const Eigen::Vector3d error = row.p_m - forward(*model, row.q_rad, row.context, ws).position;
+  for (const Eigen::Vector3d& error : position_errors_m(arm, estimate, others)) {
     const double x = normal(random);
     const double y = normal(random);
     residual.true_m += error.norm() / static_cast<double>(others.size());
@@ -109,25 +105,19 @@ std::pair<ResidualError, double> repeated_residual_error(const StudiedArm& arm, 
 /// True position error at each pose, mm, as the paper draws it.
 std::vector<std::array<double, 2>> error_points(const StudiedArm& arm, const TermSet& estimate,
                                                 const std::vector<Observation>& others) {
-  const auto model = prepare(estimate, arm.robot, arm.name);
-  Workspace<double, joint_count> ws;
   std::vector<std::array<double, 2>> points;
-  for (std::size_t k = 0; k < others.size(); ++k) {
-    const Eigen::Vector3d e =
-        others[k].p_m - forward(*model, others[k].q_rad, others[k].context, ws).position;
-    points.push_back({static_cast<double>(k + 1), e.norm() * 1e3});
-  }
+  for (const Eigen::Vector3d& error : position_errors_m(arm, estimate, others))
+    points.push_back({static_cast<double>(points.size() + 1), error.norm() * 1e3});
   return points;
 }
 
 }  // namespace
 
 Study study_table3(const StudyOptions& options) {
-  Study study;
-  study.name = "table3";
-  study.title = "Table 3, Fig. 10 and 12: residual errors at 30 other poses";
-  study.quantity = "mean position error [mm]";
-  study.label_names = {"arm", "noise", "model", "parameters", "seen"};
+  Study study{"table3",
+              "Table 3, Fig. 10 and 12: residual errors at 30 other poses",
+              "mean position error [mm]",
+              {"arm", "noise", "model", "parameters", "seen"}};
   struct Model {
     const char* name;
     bool orientations;
@@ -148,21 +138,14 @@ Study study_table3(const StudyOptions& options) {
     const std::vector<StudiedPose> poses = planned_poses(arm, measured_poses, Planning::ours, options.seed);
     for (const NoiseLevel& noise : options.noises) {
       const std::vector<Observation> others = clean_rows(arm, elsewhere, true, noise);
-      Curves curves;
-      curves.described = "Mean error at each of 30 poses by model, " + arm.name;
-      curves.x_name = "pose";
-      curves.y_name = "mm";
-      curves.log_y = true;
+      Curves curves{.described = "Mean error at each of 30 poses by model, " + arm.name,
+                    .x_name = "pose",
+                    .y_name = "mm",
+                    .log_y = true};
       const auto add = [&](const std::string& model, const std::string& parameters, const std::string& seen,
                            const std::optional<double>& paper, double mm, const std::optional<double>& sigma,
                            const std::optional<double>& limit) {
-        StudyRow row;
-        row.labels = {arm.name, noise.name, model, parameters, seen};
-        row.paper = paper;
-        row.ours = mm;
-        row.uncertainty = sigma;
-        row.limit = limit;
-        study.rows.push_back(row);
+        study.rows.push_back({{arm.name, noise.name, model, parameters, seen}, paper, mm, sigma, limit});
       };
       const auto if_printed = [&](double tx60l_mm, double rx160l_mm) -> std::optional<double> {
         return tx60l ? tx60l_mm : rx160l_mm;
@@ -171,13 +154,12 @@ Study study_table3(const StudyOptions& options) {
       add("nominal", "0", "as measured", if_printed(1.41, 3.72), before.measured_m * 1e3, {}, {});
       for (const Model& m : models) {
         options.report(fmt::format("{} {}: {}", arm.name, noise.name, m.name), 0.5);
-        ExperimentOptions how;
-        how.orientations = m.orientations;
-        how.model = m.kind;
-        how.method = Estimation::ours;
-        how.noise = noise;
-        how.fit_all = true;
-        const Experiment experiment(m.orientations ? arm : flange, poses, how);
+        const Experiment experiment(m.orientations ? arm : flange, poses,
+                                    {.orientations = m.orientations,
+                                     .model = m.kind,
+                                     .method = Estimation::ours,
+                                     .noise = noise,
+                                     .fit_all = true});
         const auto [mean, sigma_m] =
             repeated_residual_error(arm, experiment, others, noise, calibrations, options.seed);
         const double sigma = sigma_m * 1e3;

@@ -4,12 +4,15 @@
 #define FLEXCOMP_TESTS_SUPPORT_MEASURING_HPP
 
 #include <cstdint>
+#include <map>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "flexcomp/forward.hpp"
-#include "identification/residuals.hpp"
+#include "identification/identify.hpp"
 #include "measurement/observation.hpp"
+#include "model/effects.hpp"
 #include "model/host_model.hpp"
 #include "support/arms.hpp"
 #include "units.hpp"
@@ -42,8 +45,8 @@ struct Measuring {
   double noise = 1;  // times N1
   bool pose = true;
   std::vector<double> payload_kg{1.108};
-  Pose<double> f;
-  Pose<double> e;
+  Pose<double> f = {};
+  Pose<double> e = {};
 };
 
 inline Observation measure(const HostModel& model, const arms::Joints& q, std::size_t k, const Measuring& how,
@@ -77,6 +80,24 @@ inline std::vector<Observation> measure(const Robot& robot, const TermSet& set, 
   for (std::size_t k = 0; k < count; ++k)
     rows.push_back(measure(*model, poses.pose(robot.nominal), k, how, random));
   return rows;
+}
+
+/// Least squares without weights and bounds.
+inline IdentifyOptions plain_least_squares() { return {.physical = false, .estimator = {.robust = false}}; }
+
+/// Parameters by name, SI.
+inline std::map<std::string, double> values_of(const TermSet& set, const Robot& robot) {
+  std::map<std::string, double> values;
+  for (const Parameter& p : parameters_of(set, robot.nominal)) values[p.name] = p.get(set);
+  return values;
+}
+
+/// The truth with d1 + base z and theta1 + base rz lumped, as poses alone know them.
+inline std::map<std::string, double> lumped_truth(const Robot& robot) {
+  std::map<std::string, double> values = values_of(truth(), robot);
+  values["link1.d_mm"] += values["base.z_mm"];
+  values["link1.theta_deg"] += values["base.rz_deg"];
+  return values;
 }
 
 }  // namespace measuring

@@ -48,21 +48,12 @@ double disagreement(const hidden::Case& c) {
   bare.hidden.clear();
   bare.outside.reset();
   bare.bump.reset();
-  bare.truth.nonlinear_compliance.clear();
-  bare.truth.gear_harmonic.clear();
-  bare.truth.joint_curve.clear();
-  bare.truth.backlash.clear();
-  bare.truth.readout_lag.clear();
-  bare.truth.encoder_scale.clear();
-  bare.truth.joint_coupling.clear();
-  bare.truth.axis_wobble.clear();
-  bare.truth.link_bending.clear();
-  bare.truth.thermal_growth.clear();
-  bare.truth.base_drift.clear();
-  bare.truth.base_compliance.clear();
-  bare.truth.payload_error.clear();
-  bare.truth.reflector_slip.clear();
-  bare.truth.hook.clear();
+  bare.truth = plain::Truth();
+  bare.truth.geometric = c.truth.geometric;
+  bare.truth.base = c.truth.base;
+  bare.truth.tool = c.truth.tool;
+  bare.truth.joint_compliance = c.truth.joint_compliance;
+  bare.truth.link_gravity = c.truth.link_gravity;
   const auto with = prepare(hidden::terms_of(c), c.robot, "with");
   const auto without = prepare(hidden::terms_of(bare), c.robot, "without");
   double largest = 0;
@@ -121,8 +112,7 @@ TEST(HiddenArm, IsMeasuredWithTheNoiseThatTheRobotFileStates) {
   double measured = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const hidden::Case c = hidden::draw(hidden::Row::two, seed);
-    Estimate truth;
-    truth.set = hidden::terms_of(c);
+    Estimate truth{.set = hidden::terms_of(c)};
     const auto model = prepare(truth.set, c.robot, "truth");
     const double own = chi_square(residuals(truth, *model, c.train), c.train);
     EXPECT_TRUE(chi_square_is_usual(own, measured_numbers(c.train))) << seed << " " << own;
@@ -226,8 +216,7 @@ TEST(Oracle, ExplainsTheDataDownToTheNoise) {
       if (blind) continue;
       const judging::Oracle oracle = judging::oracle_of(c);
       // A payload error that the data cannot show may leave a flat valley.
-      const bool shown = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
-                                     [](const judging::Hidden& h) { return h.detectable(); });
+      const bool shown = std::ranges::all_of(oracle.hidden, &judging::Hidden::detectable);
       EXPECT_TRUE(oracle.converged || !shown) << hidden::name(row) << seed << " " << c.what;
       const double n = measured_numbers(c.clean_train());
       EXPECT_TRUE(chi_square_is_usual(oracle.chi2, n - 40))
@@ -244,8 +233,7 @@ TEST(Oracle, NoNameIsBetterThanTheRivalThatItFinds) {
     ASSERT_EQ(oracle.hidden.size(), 1U);
     const Fit& base = oracle.before.fit;
     const double log_n = std::log(measured_numbers(c.train));
-    EstimatorOptions plain_squares;
-    plain_squares.robust = false;
+    const EstimatorOptions plain_squares{.robust = false};
     // The fit of the paper's model alone is one of robust weights; again, without them.
     const Fit none =
         fit(base.estimate, oracle.before.identifiability.fitted, c.train, c.robot, plain_squares);
@@ -299,17 +287,13 @@ TEST(Oracle, FindsABumpWithoutBeingToldItsPlace) {
 }
 
 TEST(Rate, HasTheIntervalOfClopperAndPearson) {
-  judging::Rate none;
-  none.of = 10;
+  const judging::Rate none{0, 10};
   EXPECT_EQ(none.low(), 0);
   EXPECT_NEAR(none.high(), 0.30850, 1e-5);  // 1 - 0.025^(1/10)
-  judging::Rate all;
-  all.hits = all.of = 200;
+  const judging::Rate all{200, 200};
   EXPECT_NEAR(all.low(), std::pow(0.025, 1.0 / 200), 1e-9);
   EXPECT_EQ(all.high(), 1);
-  judging::Rate some;  // binom.test(7, 20): 0.1539092 0.5921885
-  some.hits = 7;
-  some.of = 20;
+  const judging::Rate some{7, 20};  // binom.test(7, 20): 0.1539092 0.5921885
   EXPECT_NEAR(some.low(), 0.1539092, 1e-6);
   EXPECT_NEAR(some.high(), 0.5921885, 1e-6);
 }

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "identification/fitted_calibration.hpp"
 #include "model/covariate.hpp"
 #include "model/place.hpp"
 
@@ -26,55 +27,50 @@ double processor_seconds() {
 }
 
 bool is_among(const EffectId& id, const std::vector<Hidden>& hidden) {
-  return std::any_of(hidden.begin(), hidden.end(), [&](const Hidden& h) { return names_match(h.id, id); });
+  return std::ranges::any_of(hidden, [&](const Hidden& h) { return names_match(h.id, id); });
 }
 
 bool finds(const Diagnosis& d, const EffectId& id) {
-  return std::any_of(d.effects.begin(), d.effects.end(),
-                     [&](const FoundEffect& f) { return names_match(f.id, id); });
+  return std::ranges::any_of(d.effects, [&](const FoundEffect& f) { return names_match(f.id, id); });
 }
 
 bool lists(const Diagnosis& d, const EffectId& id) {
-  return finds(d, id) || std::any_of(d.effects.begin(), d.effects.end(), [&](const FoundEffect& f) {
-           return std::any_of(f.confounded_with.begin(), f.confounded_with.end(),
-                              [&](const Rival& r) { return names_match(r.id, id); });
+  return finds(d, id) || std::ranges::any_of(d.effects, [&](const FoundEffect& f) {
+           return std::ranges::any_of(f.confounded_with,
+                                      [&](const Rival& r) { return names_match(r.id, id); });
          });
 }
 
 /// Neither true, nor confounded with a truth that these data do not decide.
 bool is_wrong(const FoundEffect& found, const Oracle& oracle) {
   if (is_among(found.id, oracle.hidden)) return false;
-  return std::none_of(oracle.hidden.begin(), oracle.hidden.end(), [&](const Hidden& h) {
-    return !h.decidable() && std::any_of(found.confounded_with.begin(), found.confounded_with.end(),
-                                         [&](const Rival& r) { return names_match(r.id, h.id); });
+  return std::ranges::none_of(oracle.hidden, [&](const Hidden& h) {
+    return !h.decidable() && std::ranges::any_of(found.confounded_with,
+                                                 [&](const Rival& r) { return names_match(r.id, h.id); });
   });
 }
 
 bool exactly_named(const Diagnosis& d, const Oracle& oracle) {
   return d.verdict == Verdict::named && d.effects.size() == oracle.hidden.size() &&
-         std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
-                     [&](const Hidden& h) { return finds(d, h.id); });
+         std::ranges::all_of(oracle.hidden, [&](const Hidden& h) { return finds(d, h.id); });
 }
 
 bool finds_kind(const Diagnosis& d, Effect kind) {
-  return std::any_of(d.effects.begin(), d.effects.end(),
-                     [&](const FoundEffect& f) { return f.id.effect == kind; });
+  return std::ranges::any_of(d.effects, [&](const FoundEffect& f) { return f.id.effect == kind; });
 }
 
 /// Everything decidable is named and nothing wrong is; what cannot be tested for want of a column is said to be so.
 bool as_good_as_it_can(const hidden::Case& c, const Diagnosis& d, const Oracle& oracle) {
   for (const Hidden& h : oracle.hidden) {
     if (hidden::needs_what_is_missing(h.id.effect, c.roughness)) {
-      const bool told = std::any_of(d.not_testable.begin(), d.not_testable.end(), [&](const NotTestable& n) {
-        return n.effect == h.id.effect && !n.needs.empty();
-      });
+      const bool told = std::ranges::any_of(
+          d.not_testable, [&](const NotTestable& n) { return n.effect == h.id.effect && !n.needs.empty(); });
       if (!told) return false;
     } else if (h.decidable() && !finds(d, h.id)) {
       return false;
     }
   }
-  return std::none_of(d.effects.begin(), d.effects.end(),
-                      [&](const FoundEffect& f) { return is_wrong(f, oracle); });
+  return std::ranges::none_of(d.effects, [&](const FoundEffect& f) { return is_wrong(f, oracle); });
 }
 
 bool is_right(const hidden::Case& c, const Diagnosis& d, const Oracle& oracle) {
@@ -87,8 +83,7 @@ bool is_right(const hidden::Case& c, const Diagnosis& d, const Oracle& oracle) {
     case hidden::Row::geometry:
       // Which of the small compliances of the wrist show is the data's to say.
       return d.verdict == Verdict::named && finds_kind(d, Effect::joint_compliance) &&
-             finds_kind(d, Effect::link_gravity) &&
-             std::all_of(d.effects.begin(), d.effects.end(), [](const FoundEffect& f) {
+             finds_kind(d, Effect::link_gravity) && std::ranges::all_of(d.effects, [](const FoundEffect& f) {
                return f.id.effect == Effect::joint_compliance || f.id.effect == Effect::link_gravity;
              });
     case hidden::Row::rough:
@@ -153,17 +148,11 @@ Outcome judge(const hidden::Case& c, const Oracle& oracle, const Diagnosis& d) {
   }
   out.said = words_of(d);
   out.right = is_right(c, d, oracle);
-  out.listed = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
-                           [&](const Hidden& h) { return lists(d, h.id); });
-  out.complete = std::all_of(oracle.hidden.begin(), oracle.hidden.end(),
-                             [&](const Hidden& h) { return !h.decidable() || finds(d, h.id); });
-  out.wrong = std::any_of(d.effects.begin(), d.effects.end(),
-                          [&](const FoundEffect& f) { return is_wrong(f, oracle); });
-  Estimate after;
-  after.set = d.after.terms;
-  after.f = d.after.f();
-  after.e = d.after.e();
-  out.rms_m = rms_m(after, c.robot, c.held_out);
+  out.listed = std::ranges::all_of(oracle.hidden, [&](const Hidden& h) { return lists(d, h.id); });
+  out.complete =
+      std::ranges::all_of(oracle.hidden, [&](const Hidden& h) { return !h.decidable() || finds(d, h.id); });
+  out.wrong = std::ranges::any_of(d.effects, [&](const FoundEffect& f) { return is_wrong(f, oracle); });
+  out.rms_m = rms_m(estimate_of(d.after), c.robot, c.held_out);
   out.rms_before_m = rms_m(oracle.before.fit.estimate, c.robot, c.held_out);
   out.rms_oracle_m = rms_m(oracle.estimate, c.robot, c.held_out);
   out.floor_m = std::sqrt(3.0) * c.robot.position_sigma_m;

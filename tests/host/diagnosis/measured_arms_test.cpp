@@ -49,8 +49,7 @@ Calibration with_effects_of(const Calibration& other, const Identification& star
                             const std::vector<Observation>& rows) {
   std::set<std::string> names;
   for (const Parameter& p : start.identifiability.fitted.parameters) names.insert(p.name);
-  Unknowns unknowns;
-  unknowns.frames = start.identifiability.fitted.frames;
+  Unknowns unknowns{.frames = start.identifiability.fitted.frames};
   for (Parameter& p : parameters_of(other.terms, arm.robot.nominal)) {
     if (names.count(p.name) != 0) unknowns.parameters.push_back(std::move(p));
   }

@@ -118,8 +118,7 @@ std::vector<Candidate> candidates_of(const hidden::Case& c, const Estimate& at,
   }
   Estimate estimate = at;
   estimate.set = model.set;
-  Unknowns unknowns;
-  unknowns.parameters = model.parameters;
+  Unknowns unknowns{.parameters = model.parameters};
   const auto prepared = prepare(estimate.set, c.robot, "oracle");
   const Linearised lin = linearised(estimate, *prepared, rows, unknowns);
   std::vector<Candidate> out;
@@ -134,9 +133,8 @@ std::vector<Candidate> candidates_of(const hidden::Case& c, const Estimate& at,
     }
     // At every time between two rows; which one is a parameter too.
     std::vector<double> times;
-    times.reserve(rows.size());
     for (const Observation& row : rows) times.push_back(row.context.time_s);
-    std::sort(times.begin(), times.end());
+    std::ranges::sort(times);
     times.erase(std::unique(times.begin(), times.end()), times.end());
     for (std::size_t t = 1; t < times.size(); ++t) {
       Candidate slip = k;
@@ -184,9 +182,7 @@ Fitted fitted(const Estimate& start, const Unknowns& unknowns, const std::vector
       out.unknowns.prior[p].tolerance = 5e-4;
     }
   }
-  EstimatorOptions plain_squares;
-  plain_squares.robust = false;
-  const Fit result = fit(start, out.unknowns, rows, robot, plain_squares);
+  const Fit result = fit(start, out.unknowns, rows, robot, {.robust = false});
   out.estimate = result.estimate;
   out.chi2 = result.chi2;
   out.converged = result.converged;
@@ -201,8 +197,7 @@ Unknowns independent(Estimate& start, const Unknowns& all, std::size_t first,
   const MatrixXd columns = linearised(start, *model, rows, all).derivative;
   Span span(columns.rows());
   span.add(columns.leftCols(static_cast<Index>(all.frames.size() + first)));
-  Unknowns kept;
-  kept.frames = all.frames;
+  Unknowns kept{.frames = all.frames};
   for (std::size_t p = 0; p < all.parameters.size(); ++p) {
     if (p >= first) {
       const Index rank = span.basis().cols();
@@ -224,15 +219,10 @@ double gain_of_a_bump(const hidden::Case& c, const Estimate& at, const std::vect
   double best = 0;
   for (const std::size_t size : {16U, 24U, 36U, 48U, 64U}) {
     ParametricModel model{at.set, {}};
-    EffectId id;
-    id.effect = Effect::joint_curve;
-    id.joint = joint;
-    id.coefficients = size;
-    add_effect(model, id, c.robot.nominal);
+    add_effect(model, {.effect = Effect::joint_curve, .joint = joint, .coefficients = size}, c.robot.nominal);
     Estimate estimate = at;
     estimate.set = model.set;
-    Unknowns unknowns;
-    unknowns.parameters = model.parameters;
+    Unknowns unknowns{.parameters = model.parameters};
     const auto prepared = prepare(estimate.set, c.robot, "oracle");
     const MatrixXd columns = linearised(estimate, *prepared, rows, unknowns).derivative;
     const MatrixXd projected = columns - span.basis() * (span.basis().transpose() * columns);
@@ -278,12 +268,11 @@ void find_rival(const hidden::Case& c, const Fitted& rest, const std::vector<Obs
   const std::vector<Candidate> candidates = candidates_of(c, rest.estimate, rows);
   std::vector<Promise> promises;
   for (const Candidate& candidate : candidates) {
-    const bool true_name = std::any_of(groups.begin(), groups.end(),
-                                       [&](const Group& g) { return names_match(g.id, candidate.id); });
+    const bool true_name =
+        std::ranges::any_of(groups, [&](const Group& g) { return names_match(g.id, candidate.id); });
     if (!true_name) promises.push_back({&candidate, without - bic_gain(candidate, span, left, log_n)});
   }
-  std::sort(promises.begin(), promises.end(),
-            [](const Promise& a, const Promise& b) { return a.bic < b.bic; });
+  std::ranges::sort(promises, {}, &Promise::bic);
   constexpr std::size_t most_fits = 10;
   for (std::size_t k = 0; k < std::min(most_fits, promises.size()) && promises[k].bic < best; ++k) {
     const Candidate& candidate = *promises[k].candidate;
@@ -292,9 +281,7 @@ void find_rival(const hidden::Case& c, const Fitted& rest, const std::vector<Obs
     add_effect(with, candidate.id, c.robot.nominal);
     Estimate start = rest.estimate;
     start.set = with.set;
-    Unknowns all;
-    all.frames = rest.unknowns.frames;
-    all.parameters = with.parameters;
+    Unknowns all{.frames = rest.unknowns.frames, .parameters = with.parameters};
     const Unknowns unknowns = independent(start, all, first, rows, c.robot);
     const double bic = fitted(start, unknowns, rows, c.robot).bic + candidate.further_parameters * log_n;
     if (bic >= best) continue;
@@ -320,8 +307,8 @@ std::vector<Group> groups_of(const hidden::Case& c, const ParametricModel& model
   const std::vector<Parameter>& in_fit = truth.unknowns.parameters;
   const auto place_of = [&](const Parameter& p) {
     return static_cast<std::size_t>(
-        std::find_if(in_fit.begin(), in_fit.end(),
-                     [&](const Parameter& q) { return q.terms == p.terms && q.value == p.value; }) -
+        std::ranges::find_if(in_fit,
+                             [&](const Parameter& q) { return q.terms == p.terms && q.value == p.value; }) -
         in_fit.begin());
   };
   std::vector<Group> groups;
@@ -335,25 +322,17 @@ std::vector<Group> groups_of(const hidden::Case& c, const ParametricModel& model
     groups.push_back(g);
   };
   for (const hidden::Effect& e : c.hidden) take(e.id, e.values.size());
-  EffectId id;
-  if (c.bump) {
-    id.effect = Effect::joint_curve;
-    id.joint = c.bump->joint;
-    take(id, 1);
-  }
+  if (c.bump) take({.effect = Effect::joint_curve, .joint = c.bump->joint}, 1);
   if (c.outside) {
-    id.effect = Effect::unnamed;
-    id.place = {static_cast<std::uint8_t>(c.outside->joint), flexcomp::slot::theta};
-    take(id, 1);
+    const auto link = static_cast<std::uint8_t>(c.outside->joint);
+    take({.effect = Effect::unnamed, .place = {link, flexcomp::slot::theta}}, 1);
   }
   if (c.row != hidden::Row::geometry) return groups;
   for (std::size_t p = 0; p < of_paper; ++p) {
     const flexcomp::Term<double>& t = model.set.terms[model.parameters[p].terms.front()];
     if (t.effect == Effect::geometric) continue;
-    id.effect = t.effect;
-    id.joint = t.effect == Effect::joint_compliance ? t.place.body : 0U;
-    const auto same =
-        std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return names_match(g.id, id); });
+    const EffectId id{.effect = t.effect, .joint = t.effect == Effect::joint_compliance ? t.place.body : 0U};
+    const auto same = std::ranges::find_if(groups, [&](const Group& g) { return names_match(g.id, id); });
     if (same == groups.end()) {
       groups.push_back({id, {p}});
     } else {
@@ -365,9 +344,7 @@ std::vector<Group> groups_of(const hidden::Case& c, const ParametricModel& model
 
 }  // namespace
 
-bool Oracle::decidable() const {
-  return std::all_of(hidden.begin(), hidden.end(), [](const Hidden& h) { return h.decidable(); });
-}
+bool Oracle::decidable() const { return std::ranges::all_of(hidden, &Hidden::decidable); }
 
 bool names_match(const EffectId& a, const EffectId& b) {
   return a.effect == b.effect && a.joint == b.joint && a.from == b.from && a.link == b.link &&
@@ -379,55 +356,32 @@ std::vector<EffectId> every_name(const Nominal& robot, double pivot_z_m) {
   const auto add = [&](EffectId id) {
     if (!validation_error(id, robot)) names.push_back(std::move(id));
   };
-  for (const Effect kind : {Effect::nonlinear_compliance, Effect::backlash, Effect::readout_lag,
-                            Effect::encoder_scale, Effect::joint_curve}) {
-    for (unsigned j = 1; j <= joint_count; ++j) {
-      EffectId id;
-      id.effect = kind;
-      id.joint = j;
-      if (kind == Effect::joint_curve) id.coefficients = 12;
-      add(id);
-    }
-  }
   for (unsigned j = 1; j <= joint_count; ++j) {
-    EffectId id;
-    id.joint = j;
-    id.effect = Effect::gear_harmonic;
-    for (int order = 1; order <= 8; ++order) {
-      id.order = order;
-      add(id);
-    }
-    id.effect = Effect::axis_wobble;
-    for (int order = 1; order <= 2; ++order) {
-      id.order = order;
-      add(id);
-    }
-    id.order = 0;
-    id.effect = Effect::joint_coupling;
-    for (id.from = 1; id.from <= joint_count; ++id.from) add(id);
+    for (const Effect kind :
+         {Effect::nonlinear_compliance, Effect::backlash, Effect::readout_lag, Effect::encoder_scale})
+      add({.effect = kind, .joint = j});
+    add({.effect = Effect::joint_curve, .joint = j, .coefficients = 12});
+    for (int order = 1; order <= 8; ++order)
+      add({.effect = Effect::gear_harmonic, .joint = j, .order = static_cast<double>(order)});
+    for (int order = 1; order <= 2; ++order)
+      add({.effect = Effect::axis_wobble, .joint = j, .order = static_cast<double>(order)});
+    for (unsigned from = 1; from <= joint_count; ++from)
+      add({.effect = Effect::joint_coupling, .joint = j, .from = from});
   }
   for (unsigned link = 0; link <= joint_count; ++link) {
-    EffectId id;
-    id.link = link;
-    id.effect = Effect::thermal_growth;
-    add(id);
-    id.effect = Effect::link_bending;
-    if (link != 0) add(id);
+    add({.effect = Effect::thermal_growth, .link = link});
+    if (link != 0) add({.effect = Effect::link_bending, .link = link});
   }
-  for (const Effect kind :
-       {Effect::base_drift, Effect::base_compliance, Effect::payload_error, Effect::reflector_slip}) {
-    EffectId id;
-    id.effect = kind;
-    if (kind == Effect::base_compliance) id.pivot_z_m = pivot_z_m;
-    add(id);
-  }
+  for (const Effect kind : {Effect::base_drift, Effect::payload_error, Effect::reflector_slip})
+    add({.effect = kind});
+  add({.effect = Effect::base_compliance, .pivot_z_m = pivot_z_m});
   return names;
 }
 
 double rms_m(const Estimate& estimate, const Robot& robot, const std::vector<Observation>& rows) {
-  const auto model = prepare(estimate.set, robot, "judged rows");
   double sum = 0;
-  for (const RowResidual& r : residuals(estimate, *model, rows)) sum += r.position_m.squaredNorm();
+  for (const RowResidual& r : residuals(estimate, robot, rows, "judged rows"))
+    sum += r.position_m.squaredNorm();
   return std::sqrt(sum / static_cast<double>(rows.size()));
 }
 
@@ -446,9 +400,7 @@ Oracle oracle_of(const hidden::Case& c) {
   hidden::append_hidden(model, c, true);
   Estimate start = full.fit.estimate;
   start.set = model.set;
-  Unknowns all;
-  all.frames = full.identifiability.fitted.frames;
-  all.parameters = model.parameters;
+  Unknowns all{.frames = full.identifiability.fitted.frames, .parameters = model.parameters};
   const Fitted truth = fitted(start, independent(start, all, of_paper, rows, c.robot), rows, c.robot);
   out.estimate = truth.estimate;
   out.converged = truth.converged;
@@ -458,11 +410,10 @@ Oracle oracle_of(const hidden::Case& c) {
   for (const Group& g : groups) out.hidden.push_back({g.id, 0, "nothing", 0, 0});
   for (std::size_t g = 0; g < groups.size(); ++g) {
     Estimate without = truth.estimate;
-    Unknowns others;
-    others.frames = truth.unknowns.frames;
+    Unknowns others{.frames = truth.unknowns.frames};
     for (std::size_t p = 0; p < truth.unknowns.parameters.size(); ++p) {
       const std::vector<std::size_t>& own = groups[g].parameters;
-      if (std::find(own.begin(), own.end(), p) == own.end()) {
+      if (std::ranges::find(own, p) == own.end()) {
         others.parameters.push_back(truth.unknowns.parameters[p]);
       } else {
         truth.unknowns.parameters[p].set(without.set, 0);

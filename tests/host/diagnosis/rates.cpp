@@ -10,6 +10,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <mutex>
@@ -115,10 +116,9 @@ std::vector<Outcome> run(hidden::Row row, const Options& options, std::ofstream&
 
 /// The value below which a share of the values lies; of values that are numbers.
 double quantile(std::vector<double> values, double share) {
-  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
-               values.end());
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
   if (values.empty()) return std::nan("");
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const double at = share * static_cast<double>(values.size() - 1);
   const auto below = static_cast<std::size_t>(at);
   const std::size_t above = std::min(below + 1, values.size() - 1);
@@ -135,25 +135,26 @@ void print_rate(const std::string& what, const Rate& rate, double goal, bool at_
              100 * rate.value(), 100 * rate.low(), 100 * rate.high(), verdict);
 }
 
+bool all(const Outcome&) { return true; }
+
+/// \param which, hit  functions or members of an Outcome
 template <class Which, class Hit>
 Rate rate_of(const std::vector<Outcome>& outcomes, const Which& which, const Hit& hit) {
   Rate rate;
   for (const Outcome& o : outcomes) {
-    if (which(o)) rate.count(hit(o));
+    if (std::invoke(which, o)) rate.count(std::invoke(hit, o));
   }
   return rate;
 }
 
 void print_rates(hidden::Row row, const std::vector<Outcome>& outcomes) {
-  const auto all = [](const Outcome&) { return true; };
-  const auto decidable = [](const Outcome& o) { return o.decidable; };
+  constexpr auto decidable = &Outcome::decidable;
+  constexpr auto right = &Outcome::right;
+  constexpr auto listed = &Outcome::listed;
+  constexpr auto wrong = &Outcome::wrong;
   const auto undecidable = [](const Outcome& o) { return !o.decidable && o.detectable && !o.beaten(); };
   const auto beaten = [](const Outcome& o) { return !o.decidable && o.detectable && o.beaten(); };
   const auto undetectable = [](const Outcome& o) { return !o.decidable && !o.detectable; };
-  const auto right = [](const Outcome& o) { return o.right; };
-  const auto listed = [](const Outcome& o) { return o.listed; };
-  const auto complete = [](const Outcome& o) { return o.complete; };
-  const auto wrong = [](const Outcome& o) { return o.wrong; };
   using hidden::Row;
   switch (row) {
     case Row::one:
@@ -181,7 +182,7 @@ void print_rates(hidden::Row row, const std::vector<Outcome>& outcomes) {
       print_rate("decidable: both and nothing else", rate_of(outcomes, decidable, right), 0.90);
       break;
     case Row::third:
-      print_rate("decidable: found", rate_of(outcomes, decidable, complete), 0.80);
+      print_rate("decidable: found", rate_of(outcomes, decidable, &Outcome::complete), 0.80);
       print_rate("all: a wrong name", rate_of(outcomes, all, wrong), 0.03, true);
       break;
     case Row::geometry:
@@ -232,12 +233,9 @@ void print_groups(const std::vector<Outcome>& outcomes) {
   fmt::print("  {:<26} {:>6} {:>10} {:>12} {:>10} {:>8} {:>12}\n", "by kind", "cases", "decidable",
              "right of it", "listed", "wrong", "median ratio");
   for (const auto& [name, list] : groups) {
-    const Rate right = rate_of(
-        list, [](const Outcome& o) { return o.decidable; }, [](const Outcome& o) { return o.right; });
-    const Rate listed = rate_of(
-        list, [](const Outcome&) { return true; }, [](const Outcome& o) { return o.listed; });
-    const Rate wrong = rate_of(
-        list, [](const Outcome&) { return true; }, [](const Outcome& o) { return o.wrong; });
+    const Rate right = rate_of(list, &Outcome::decidable, &Outcome::right);
+    const Rate listed = rate_of(list, all, &Outcome::listed);
+    const Rate wrong = rate_of(list, all, &Outcome::wrong);
     std::vector<double> ratio;
     for (const Outcome& o : list) ratio.push_back(o.ratio());
     fmt::print("  {:<26} {:>6} {:>10} {:>12} {:>10} {:>8} {:>12.3f}\n", name, list.size(), right.of,
@@ -254,14 +252,13 @@ void print_table(hidden::Row row, const std::vector<Outcome>& outcomes) {
     sum += o.seconds / static_cast<double>(outcomes.size());
     longest = std::max(longest, o.seconds);
   }
-  const Rate decidable = rate_of(
-      outcomes, [](const Outcome&) { return true; }, [](const Outcome& o) { return o.decidable; });
-  const Rate undetectable = rate_of(
-      outcomes, [](const Outcome&) { return true; }, [](const Outcome& o) { return !o.detectable; });
+  const Rate decidable = rate_of(outcomes, all, &Outcome::decidable);
+  const Rate detectable = rate_of(outcomes, all, &Outcome::detectable);
   fmt::print(
       "\n{}: {} cases, {} decidable, {} undetectable; {:.2f} s per diagnosis by the clock ({:.2f} s "
       "of the thread), longest {:.2f} s\n",
-      hidden::name(row), outcomes.size(), decidable.hits, undetectable.hits, sum, processor, longest);
+      hidden::name(row), outcomes.size(), decidable.hits, detectable.of - detectable.hits, sum, processor,
+      longest);
   print_rates(row, outcomes);
   print_gap(row, outcomes);
   print_groups(outcomes);

@@ -23,6 +23,31 @@ Robot file_of(const arms::Robot& nominal) {
   return robot;
 }
 
+/// Columns of all parameters at random poses, with their order of preference.
+struct Columns {
+  std::vector<Parameter> parameters;
+  Eigen::MatrixXd derivative;
+  std::vector<std::size_t> order;
+};
+
+Columns columns(const Robot& robot, ModelKind kind, Measured measured, std::size_t poses, std::uint64_t seed,
+                double position_sigma_m = 0.035e-3, double orientation_sigma_rad = 0.007 * arms::deg) {
+  Observation like;
+  like.context = default_context<double>(robot.nominal);
+  like.has_orientation = measured == Measured::pose;
+  like.whitening.setZero();
+  like.whitening.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / position_sigma_m;
+  if (like.has_orientation)
+    like.whitening.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / orientation_sigma_rad;
+  const ParametricModel paper = paper_model(robot.nominal, kind, true);
+  const Unknowns unknowns{{}, paper.parameters, {}};
+  const Estimate estimate{paper.set, {}, {}};
+  const auto model = prepare(estimate.set, robot, "test");
+  const auto rows = random_observations(robot, {like}, poses, seed);
+  return {paper.parameters, linearised(estimate, *model, rows, unknowns).derivative,
+          elimination_order(unknowns, estimate.set)};
+}
+
 struct Sizes {
   std::size_t parameters;
   std::size_t identifiable;
@@ -30,24 +55,10 @@ struct Sizes {
 };
 
 Sizes sizes(const Robot& robot, ModelKind kind, Measured measured, std::size_t poses, std::uint64_t seed) {
-  Observation like;
-  like.context = default_context<double>(robot.nominal);
-  like.has_orientation = measured == Measured::pose;
-  like.whitening.setZero();
-  like.whitening.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / 0.035e-3;
-  if (like.has_orientation)
-    like.whitening.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / (0.007 * arms::deg);
-  const ParametricModel paper = paper_model(robot.nominal, kind, true);
-  Unknowns unknowns;
-  unknowns.parameters = paper.parameters;
-  Estimate estimate;
-  estimate.set = paper.set;
-  const auto model = prepare(estimate.set, robot, "test");
-  const auto rows = random_observations(robot, {like}, poses, seed);
-  const Linearised lin = linearised(estimate, *model, rows, unknowns);
-  const Elimination e = eliminate(lin.derivative, elimination_order(unknowns, estimate.set));
-  Sizes s{paper.parameters.size(), e.kept.size(), {}};
-  for (const DependentColumn& l : e.dependent) s.lost.push_back(paper.parameters[l.column].name);
+  const Columns c = columns(robot, kind, measured, poses, seed);
+  const Elimination e = eliminate(c.derivative, c.order);
+  Sizes s{c.parameters.size(), e.kept.size(), {}};
+  for (const DependentColumn& l : e.dependent) s.lost.push_back(c.parameters[l.column].name);
   return s;
 }
 
@@ -84,7 +95,7 @@ TEST(ModelSizes, ACentreOfMassOnAxis6LosesItsCompliance) {
   const Robot robot = file_of(with_centre_of_mass_on_axis_6(arms::tx60l()));
   const Sizes s = sizes(robot, ModelKind::full, Measured::pose, 100, 4);
   EXPECT_EQ(s.identifiable, 35U);
-  EXPECT_TRUE(std::count(s.lost.begin(), s.lost.end(), "joint_compliance[joint=6].rad_per_nm"));
+  EXPECT_TRUE(std::ranges::count(s.lost, "joint_compliance[joint=6].rad_per_nm"));
   EXPECT_EQ(sizes(robot, ModelKind::geometric, Measured::pose, 100, 4).identifiable, 28U);
 }
 
@@ -105,7 +116,7 @@ TEST(ModelSizes, PositionsAtTheFlangeKnow24AndSevenOfTheFlexible) {
     const Robot robot = file_of(with_tool(arms::tx60l(), 0, 0, 0));
     const Sizes s = sizes(robot, ModelKind::full, Measured::position, poses, 6);
     EXPECT_EQ(s.identifiable, 31U);
-    EXPECT_TRUE(std::count(s.lost.begin(), s.lost.end(), "joint_compliance[joint=6].rad_per_nm"));
+    EXPECT_TRUE(std::ranges::count(s.lost, "joint_compliance[joint=6].rad_per_nm"));
     EXPECT_EQ(sizes(robot, ModelKind::geometric, Measured::position, poses, 6).identifiable, 24U);
   }
 }
@@ -120,33 +131,15 @@ TEST(ModelSizes, OtherArmsHaveThePapersSizesToo) {
   EXPECT_EQ(s.identifiable, 28U);
 }
 
-/// Columns of all 39 at random full poses, unwhitened, with their order of preference.
-struct FullModel {
-  std::vector<Parameter> parameters;
-  Eigen::MatrixXd derivative;
-  std::vector<std::size_t> order;
-};
-
-FullModel full_model(const Robot& robot, std::size_t poses, std::uint64_t seed) {
-  Observation like;
-  like.context = default_context<double>(robot.nominal);
-  like.has_orientation = true;
-  like.whitening.setIdentity();
-  const ParametricModel paper = paper_model(robot.nominal, ModelKind::full, true);
-  Unknowns unknowns;
-  unknowns.parameters = paper.parameters;
-  Estimate estimate;
-  estimate.set = paper.set;
-  const auto model = prepare(estimate.set, robot, "test");
-  const auto rows = random_observations(robot, {like}, poses, seed);
-  return {paper.parameters, linearised(estimate, *model, rows, unknowns).derivative,
-          elimination_order(unknowns, estimate.set)};
+/// Of all 39 at random full poses, unwhitened.
+Columns full_model(const Robot& robot, std::size_t poses, std::uint64_t seed) {
+  return columns(robot, ModelKind::full, Measured::pose, poses, seed, 1, 1);
 }
 
 // The sizes must not depend on the noise, nor on how the weak columns are scaled.
 TEST(ModelSizes, TheWeakestKeptColumnIsFarAboveTheThreshold) {
   const Robot robot = file_of(with_tool(arms::tx60l(), 10, 30, 60));
-  const FullModel full = full_model(robot, 14, 9);
+  const Columns full = full_model(robot, 14, 9);
   for (const double tolerance : {1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10}) {
     EXPECT_EQ(eliminate(full.derivative, full.order, tolerance).kept.size(), 36U) << tolerance;
   }
@@ -154,7 +147,7 @@ TEST(ModelSizes, TheWeakestKeptColumnIsFarAboveTheThreshold) {
 
 TEST(ModelSizes, EveryLostColumnNamesWhatCarriesIt) {
   const Robot robot = file_of(arms::tx60l());
-  const FullModel full = full_model(robot, 200, 10);
+  const Columns full = full_model(robot, 200, 10);
   const Elimination e = eliminate(full.derivative, full.order);
   ASSERT_EQ(e.dependent.size(), 3U);
   const auto name = [&](std::size_t c) { return full.parameters[c].name; };

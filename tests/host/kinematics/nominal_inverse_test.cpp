@@ -9,13 +9,12 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <string>
 #include <vector>
 
-#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "flexcomp/model.hpp"
 #include "support/arms.hpp"
+#include "support/robot_files.hpp"
 
 namespace {
 
@@ -24,7 +23,7 @@ using namespace flexcomp::host;
 
 TEST(NominalInverses, TheWayByWhichThePoseWasMadeIsAmongThem) {
   for (const char* name : {"kuka-kr6-r900", "abb-irb120", "tx60l", "rx160l", "ur5", "ur10"}) {
-    const Robot robot = load_robot(std::string(FLEXCOMP_SOURCE_DIR "/host/robots/") + name + ".yaml");
+    const Robot robot = support::robot(name);
     Model<double, joint_count, Capacity<1, 1, 6>> model;
     model.begin(robot.nominal);
     model.finish();
@@ -44,7 +43,7 @@ TEST(NominalInverses, TheWayByWhichThePoseWasMadeIsAmongThem) {
       const Pose<double> pose = nominal_forward(model, q);
       const auto all = nominal_inverses(robot.nominal, pose);
       ways += all.size();
-      const bool there = std::any_of(all.begin(), all.end(), [&q](const auto& other) {
+      const bool there = std::ranges::any_of(all, [&q](const auto& other) {
         double most = 0;
         for (std::size_t j = 0; j < joint_count; ++j) most = std::max(most, std::abs(q[j] - other[j]));
         return most < 1e-5;

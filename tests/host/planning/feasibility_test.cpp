@@ -5,13 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <random>
 #include <thread>
 
-#include "files/robot_file.hpp"
 #include "planning/segments.hpp"
+#include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
 namespace {
@@ -30,10 +31,6 @@ constexpr int judge_samples = 200;
 constexpr int poses_per_cell = 72000;
 constexpr int judge_samples = 1000;
 #endif
-
-const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
-
-Robot robot_of(const char* name) { return load_robot(robots + name + ".yaml"); }
 
 /// Numbers of a seed.
 class Random {
@@ -224,8 +221,8 @@ class Judge {
         if (j < own) {
           const std::size_t f = std::min(bodies_[i].frame, bodies_[j].frame);
           const std::size_t g = std::max(bodies_[i].frame, bodies_[j].frame);
-          const bool between = std::any_of(robot.capsules.begin(), robot.capsules.end(),
-                                           [&](const Capsule& c) { return c.frame > f && c.frame < g; });
+          const bool between = std::ranges::any_of(
+              robot.capsules, [&](const Capsule& c) { return c.frame > f && c.frame < g; });
           tested = tested && f != g && between && most > bodies_[i].radius_m + bodies_[j].radius_m;
         }
         if (tested) pairs_.push_back({i, j});
@@ -319,7 +316,7 @@ Capsule capsule(std::size_t frame, const V& from, const V& to, double radius) {
 std::vector<Robot> arms() {
   std::vector<Robot> list;
   for (const char* name : {"tx60l", "rx160l", "ur10"}) {
-    list.push_back(robot_of(name));
+    list.push_back(support::robot(name));
     Robot other = list.back();
     other.nominal.tool_xyz_m = {0.02, -0.01, 0.16};
     other.nominal.tool_wxyz = {0.8, 0.36, -0.48, 0.0};
@@ -407,13 +404,13 @@ Cell in_front() {
 Joints towards_tracker() { return {0, radians(30), radians(60), 0, 0, 0}; }
 
 TEST(Feasibility, APoseTowardsTheTrackerIsAllowed) {
-  const Feasibility f(robot_of("tx60l"), in_front());
+  const Feasibility f(support::robot("tx60l"), in_front());
   EXPECT_EQ(f.check(towards_tracker()), Obstruction::none) << f.why(towards_tracker());
   EXPECT_EQ(f.why(towards_tracker()), "");
 }
 
 TEST(Feasibility, LimitsIncludeTheirEndsAndNoNan) {
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   const Feasibility f(robot);
   Joints q{0, 0, 0, 0, robot.nominal.limits[4].max_rad, 0};
   EXPECT_NE(f.check(q), Obstruction::joint_limit);
@@ -426,7 +423,7 @@ TEST(Feasibility, LimitsIncludeTheirEndsAndNoNan) {
 }
 
 TEST(Feasibility, AcceptanceIsTheAngleOfTheBeam) {
-  Robot robot = robot_of("tx60l");
+  Robot robot = support::robot("tx60l");
   robot.capsules.clear();
   robot.reflectors_m.clear();  // one point, so that one angle says all
   robot.nominal.tool_xyz_m = {0, 0, 0.1};
@@ -446,7 +443,7 @@ TEST(Feasibility, AcceptanceIsTheAngleOfTheBeam) {
 }
 
 TEST(Feasibility, EveryReflectorMustBeSeen) {
-  Robot robot = robot_of("tx60l");
+  Robot robot = support::robot("tx60l");
   const Joints q = towards_tracker();
   Cell cell = in_front();
   const auto frames = chain(robot, q);
@@ -462,7 +459,7 @@ TEST(Feasibility, EveryReflectorMustBeSeen) {
 }
 
 TEST(Feasibility, TouchingIsTooNear) {
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   const Joints q = towards_tracker();
   const auto frames = chain(robot, q);
   const V elbow = apply(frames[3], V(0, 0, 0));
@@ -489,21 +486,21 @@ TEST(Feasibility, TouchingIsTooNear) {
 
 TEST(Feasibility, AToolBesideTheWristIsAskedForLessAndSaysSo) {
   // Reflector A of the reference tool is sqrt(10² + 45² + 130²) = 137.9 mm from the wrist's centre, always.
-  const Feasibility f(robot_of("tx60l"), in_front());
+  const Feasibility f(support::robot("tx60l"), in_front());
   ASSERT_EQ(f.warnings().size(), 1U);
   EXPECT_THAT(f.warnings()[0], HasSubstr("capsules[3] of"));
   EXPECT_THAT(f.warnings()[0],
               HasSubstr("Kept instead; 1: reflector A, arm A, reflector B, arm B, arm C, arm D."));
   Cell modest = in_front();
   modest.safety = 1;
-  EXPECT_THAT(Feasibility(robot_of("tx60l"), modest).warnings(), IsEmpty());
-  Robot longer = robot_of("tx60l");
+  EXPECT_THAT(Feasibility(support::robot("tx60l"), modest).warnings(), IsEmpty());
+  Robot longer = support::robot("tx60l");
   longer.nominal.tool_xyz_m = {0, 0, 0.1};
   EXPECT_THAT(Feasibility(longer, in_front()).warnings(), IsEmpty());
 }
 
 TEST(Feasibility, ABodyOnTheFlangeDoesNotForbidItsOwnTool) {
-  Robot robot = robot_of("tx60l");
+  Robot robot = support::robot("tx60l");
   robot.nominal.tool_xyz_m = {0, 0, 0.1};
   robot.capsules.push_back(capsule(6, {0, 0, -0.02}, {0, 0, 0.05}, 0.06));
   EXPECT_EQ(Feasibility(robot, in_front()).check(towards_tracker()), Obstruction::none);
@@ -515,7 +512,7 @@ TEST(Feasibility, ABodyOnTheFlangeDoesNotForbidItsOwnTool) {
 
 TEST(Feasibility, BodiesThatBelongTogetherDoNotForbidEveryPose) {
   // Column and upper arm overlap at the shoulder; a second body on the upper arm, one on the shoulder, a pedestal.
-  Robot robot = robot_of("tx60l");
+  Robot robot = support::robot("tx60l");
   robot.capsules.push_back(capsule(2, {-0.3, 0, 0}, {-0.1, 0, 0}, 0.1));
   robot.capsules.push_back(capsule(1, {0, 0, -0.1}, {0, 0, 0.1}, 0.12));
   Cell cell = in_front();
@@ -530,7 +527,7 @@ TEST(Feasibility, BodiesThatBelongTogetherDoNotForbidEveryPose) {
 }
 
 TEST(Feasibility, ATrackerInsideABodySeesNothingAndSaysWhy) {
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   Cell cell = in_front();
   cell.obstacles = {capsule(0, *cell.tracker_m - V(0, 0, 1), *cell.tracker_m - V(0, 0, 0.1), 0.15)};
   const Feasibility f(robot, cell);
@@ -545,7 +542,7 @@ TEST(Feasibility, ATrackerInsideABodySeesNothingAndSaysWhy) {
 }
 
 TEST(Feasibility, WhatIsNotTestedIsSaid) {
-  Robot robot = robot_of("tx60l");
+  Robot robot = support::robot("tx60l");
   robot.capsules.clear();
   const Feasibility bare(robot);
   EXPECT_THAT(bare.warnings(), Contains(HasSubstr("no capsules")));
@@ -561,7 +558,7 @@ TEST(Feasibility, WhatIsNotTestedIsSaid) {
 }
 
 TEST(Feasibility, FeasiblePosesAreFeasibleAndRepeatable) {
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   const Feasibility f(robot, in_front());
   const auto poses = feasible_poses(f, robot, 2000, 7);
   ASSERT_EQ(poses.size(), 2000U);
@@ -581,7 +578,7 @@ TEST(Feasibility, FeasiblePosesAreFeasibleAndRepeatable) {
 }
 
 TEST(Feasibility, NoRoomIsAnErrorThatSaysWhatWasInTheWay) {
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   Cell cell = in_front();
   cell.acceptance_rad = radians(0.5);
   support::expect_refused(
@@ -594,7 +591,7 @@ TEST(Feasibility, NoRoomIsAnErrorThatSaysWhatWasInTheWay) {
 }
 
 TEST(Feasibility, ManyThreadsMayAsk) {
-  const Robot robot = robot_of("ur10");
+  const Robot robot = support::robot("ur10");
   const Feasibility f(robot, in_front());
   Random random(3);
   std::vector<Joints> poses;
@@ -616,7 +613,7 @@ TEST(Feasibility, BodiesOfTheRobotFilesHangTogether) {
   // Each body begins inside the one before it, however the arm stands: a wrong frame or sign would tear them apart.
   Random random(21);
   for (const char* name : {"tx60l", "rx160l", "ur5", "ur10"}) {
-    const Robot robot = robot_of(name);
+    const Robot robot = support::robot(name);
     ASSERT_GE(robot.capsules.size(), 3U);
     for (int k = 0; k < 200; ++k) {
       const auto frames = chain(robot, random.pose(robot));
@@ -639,7 +636,7 @@ TEST(Feasibility, BodiesOfTheRobotFilesHangTogether) {
 
 TEST(Feasibility, TheReferenceRobotHasThePapersBodies) {
   // Section 3.2: O_f1 O_1 375 mm, r 115; O_f2 O_f3 400 mm, r 88; O_3 O_4 450 mm, r 95.
-  const Robot robot = robot_of("tx60l");
+  const Robot robot = support::robot("tx60l");
   const std::array<double, 3> length{0.375, 0.4, 0.45};
   const std::array<double, 3> radius{0.115, 0.088, 0.095};
   Random random(22);
@@ -659,9 +656,9 @@ TEST(Feasibility, TheReferenceRobotHasThePapersBodies) {
 }
 
 TEST(Feasibility, BodiesAndLimitsDoNotMakeAnotherArm) {
-  Robot robot = robot_of("rx160l");
+  Robot robot = support::robot("rx160l");
   const auto hash = flexcomp::nominal_hash(robot.nominal);
-  const std::string text = support::read(robots + "rx160l.yaml");
+  const std::string text = support::read(support::robots + "rx160l.yaml");
   const std::string without = text.substr(0, text.find("capsules:"));
   const Robot other =
       load_robot(support::write("other.yaml", support::replaced(without, "min_deg: -160", "min_deg: -100")));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The criterion against independent computations, the methods against brute force and against each other, and what a
 // plan promises: allowed poses, the same plan from the same seed, the same result after a stop.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -10,7 +9,6 @@
 #include <cstdlib>
 #include <string>
 
-#include "files/robot_file.hpp"
 #include "flexcomp/forward.hpp"
 #include "identification/identifiability.hpp"
 #include "identification/residuals.hpp"
@@ -23,13 +21,14 @@
 #include "planning/planner.hpp"
 #include "planning/refine.hpp"
 #include "planning/sapso.hpp"
+#include "support/robot_files.hpp"
 
 namespace {
 
 using namespace flexcomp;
 using namespace flexcomp::host;
 
-Robot tx60l() { return load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml"); }
+using support::tx60l;
 
 struct Task {
   Robot robot;
@@ -43,17 +42,10 @@ Task task_of(Robot robot, std::size_t poses, Measured measured = Measured::pose,
   Task t;
   t.robot = std::move(robot);
   PlanProblem& p = t.problem;
-  switch (measured) {
-    case Measured::pose:
-      p.instrument = Instrument::pose(t.robot.position_sigma_m, t.robot.orientation_sigma_rad);
-      break;
-    case Measured::position:
-      p.instrument = Instrument::position(t.robot.position_sigma_m);
-      break;
-    case Measured::reflectors:
-      p.instrument = Instrument::reflectors(t.robot.reflectors_m, t.robot.position_sigma_m);
-      break;
-  }
+  const double sigma_m = t.robot.position_sigma_m;
+  p.instrument = measured == Measured::pose       ? Instrument::pose(sigma_m, t.robot.orientation_sigma_rad)
+                 : measured == Measured::position ? Instrument::position(sigma_m)
+                                                  : Instrument::reflectors(t.robot.reflectors_m, sigma_m);
   PoseContext context = default_context<double>(t.robot.nominal);
   if (payloads.empty()) p.payloads = {context};
   for (const double kg : payloads) {
@@ -82,8 +74,7 @@ void expect_same_information(Measured measured, bool frames) {
   const Task t = task_of(tx60l(), 14, measured, frames);
   const PoseSet set = random_set(t.problem, 30, 3);
   const ParametricModel paper = paper_model(t.robot.nominal, ModelKind::full, !frames);
-  Estimate estimate;
-  estimate.set = paper.set;
+  Estimate estimate{.set = paper.set};
   const auto model = prepare(estimate.set, t.robot, "test");
   std::vector<Observation> rows;
   Workspace<double, joint_count> ws;
@@ -113,7 +104,7 @@ void expect_same_information(Measured measured, bool frames) {
   for (std::size_t c = 0; c < names.size(); ++c) {
     const auto& kept = t.problem.information->names();
     // All frames are known to this arm; of the parameters, those that are identifiable.
-    if (c < unknowns.frames.size() || std::find(kept.begin(), kept.end(), names[c]) != kept.end()) {
+    if (c < unknowns.frames.size() || std::ranges::find(kept, names[c]) != kept.end()) {
       columns.push_back(static_cast<Eigen::Index>(c));
     }
   }
@@ -132,17 +123,17 @@ TEST(PoseInformation, IsTheEstimatorsDerivative) {
 }
 
 TEST(PoseInformation, KeepsWhatSuchDataCanKnow) {
-  EXPECT_EQ(task_of(tx60l(), 14).problem.information->parameters(), 36);
-  EXPECT_EQ(task_of(tx60l(), 14, Measured::position).problem.information->parameters(), 35);
-  EXPECT_EQ(
-      task_of(tx60l(), 14, Measured::pose, false, ModelKind::geometric).problem.information->parameters(),
-      28);
-  EXPECT_EQ(
-      task_of(tx60l(), 14, Measured::pose, false, ModelKind::no_gravity).problem.information->parameters(),
-      33);
+  const auto known = [](const Robot& robot, Measured measured = Measured::pose,
+                        ModelKind kind = ModelKind::full) {
+    return task_of(robot, 14, measured, false, kind).problem.information->parameters();
+  };
+  EXPECT_EQ(known(tx60l()), 36);
+  EXPECT_EQ(known(tx60l(), Measured::position), 35);
+  EXPECT_EQ(known(tx60l(), Measured::pose, ModelKind::geometric), 28);
+  EXPECT_EQ(known(tx60l(), Measured::pose, ModelKind::no_gravity), 33);
   Robot light = tx60l();
   light.nominal.payload_kg = 0;
-  EXPECT_EQ(task_of(light, 14).problem.information->parameters(), 31);
+  EXPECT_EQ(known(light), 31);
   const auto fitted = task_of(tx60l(), 14, Measured::pose, true).problem.information;
   EXPECT_EQ(fitted->nuisance() + fitted->parameters(), 12 + 26);
 }
@@ -286,6 +277,11 @@ TEST(Criterion, GradientIsTheDifferenceQuotient) {
   }
 }
 
+std::unique_ptr<Search> finished(std::unique_ptr<Search> search) {
+  while (!search->done()) search->step();
+  return search;
+}
+
 // --- the methods -----------------------------------------------------------------------------------------
 
 // All 792 choices of 7 out of 12 poses: exchange with restarts, and DETMAX for its own criterion, find the best one.
@@ -306,9 +302,7 @@ TEST(Methods, FindTheOptimumThatBruteForceFinds) {
     best_d = std::min(best_d, t.problem.criterion(Goal::d_optimal).log_score(f));
   } while (std::prev_permutation(choice.begin(), choice.end()));
 
-  ExchangeOptions options;
-  options.restarts = 20;
-  ExchangeSearch exchange(t.problem, options);
+  ExchangeSearch exchange(t.problem, {.restarts = 20});
   while (!exchange.done()) exchange.step();
   EXPECT_NEAR(exchange.best_log_fitness(), best_dual, 1e-9);
   DetmaxSearch detmax(t.problem, {5000, 10, 1});
@@ -374,24 +368,16 @@ bool in_a_gap(const Joints& q) {
 /// Small pieces of work, so that there are many steps.
 std::unique_ptr<Search> small_search(Method method, const PlanProblem& problem, std::uint64_t seed) {
   switch (method) {
-    case Method::refine: {
-      RefineOptions options;
-      options.evaluations = 30000;
-      options.candidates = 50;
-      options.seed = seed;
-      return std::make_unique<RefineSearch>(problem, options);
-    }
+    case Method::refine:
+      return std::make_unique<RefineSearch>(
+          problem, RefineOptions{.evaluations = 30000, .candidates = 50, .seed = seed});
     case Method::exchange:
       return std::make_unique<ExchangeSearch>(problem, ExchangeOptions{200, 6, Goal::dual, seed});
     case Method::detmax:
       return std::make_unique<DetmaxSearch>(problem, DetmaxOptions{200, 6, seed});
-    case Method::sapso: {
-      SapsoOptions options;
-      options.particles = 50;
-      options.iterations = 20;
-      options.seed = seed;
-      return std::make_unique<SapsoSearch>(problem, options);
-    }
+    case Method::sapso:
+      return std::make_unique<SapsoSearch>(problem,
+                                           SapsoOptions{.particles = 50, .iterations = 20, .seed = seed});
   }
   return nullptr;
 }
@@ -434,9 +420,7 @@ TEST_P(EachMethod, ProposesOnlyWhatIsAllowed) {
 TEST_P(EachMethod, SameSeedSamePlanOtherSeedAnother) {
   const Task t = task_of(tx60l(), 8);
   const auto run = [&](std::uint64_t seed) {
-    const auto search = small_search(GetParam(), t.problem, seed);
-    while (!search->done()) search->step();
-    return to_json(search->best()).dump();
+    return to_json(finished(small_search(GetParam(), t.problem, seed))->best()).dump();
   };
   EXPECT_EQ(run(5), run(5));
   EXPECT_NE(run(5), run(6));
@@ -503,16 +487,12 @@ TEST(Refine, BeatsManyRestartsOfExchange) {
   const bool full = std::getenv("FLEXCOMP_FULL_SIZE") != nullptr;
   for (const char* name : {"tx60l", "rx160l", "ur10"}) {
     for (const std::size_t n : full ? std::vector<std::size_t>{14, 20, 40} : std::vector<std::size_t>{14}) {
-      Robot robot = load_robot(fmt::format("{}/host/robots/{}.yaml", FLEXCOMP_SOURCE_DIR, name));
+      Robot robot = support::robot(name);
       if (robot.nominal.payload_kg == 0) robot.nominal.payload_kg = 5;
       const Task t = task_of(robot, n);
-      ExchangeOptions options;
-      options.restarts = full ? 200 : 1;
-      options.candidates = full ? 5000 : 500;
-      ExchangeSearch exchange(t.problem, options);
+      ExchangeSearch exchange(t.problem, {.candidates = full ? 5000U : 500U, .restarts = full ? 200U : 1U});
       while (!exchange.done()) exchange.step();
-      const auto ours = make_search(Method::refine, t.problem, full ? 1 : 0.15, 1);
-      while (!ours->done()) ours->step();
+      const auto ours = finished(make_search(Method::refine, t.problem, full ? 1 : 0.15, 1));
       const Criterion c = t.problem.criterion();
       const double ratio = c.fitness(figures_of(t.problem, exchange.best()).figures) /
                            c.fitness(figures_of(t.problem, ours->best()).figures);
@@ -552,8 +532,7 @@ TEST(Planner, ExtendsWhatIsMeasured) {
   Task t = task_of(tx60l(), 3);
   const PoseSet measured = random_set(t.problem, 14, 40);
   t.problem.set_measured(t.problem.blocks(measured));
-  const auto search = make_search(Method::refine, t.problem, 0.1, 1);
-  while (!search->done()) search->step();
+  const auto search = finished(make_search(Method::refine, t.problem, 0.1, 1));
   ASSERT_EQ(search->best().size(), 3U);
   // The figures are those of all 17 poses.
   PoseSet all = measured;
@@ -570,13 +549,10 @@ TEST(Planner, ChoosesPayloads) {
   const Task one = task_of(tx60l(), 14);
   const Task two = task_of(tx60l(), 14, Measured::pose, false, ModelKind::full, {0, 1.108, 5});
   const auto run = [](const Task& t) {
-    const auto search = make_search(Method::refine, t.problem, 0.1, 1);
-    while (!search->done()) search->step();
-    return search->best();
+    return finished(make_search(Method::refine, t.problem, 0.1, 1))->best();
   };
   const PoseSet chosen = run(two);
-  EXPECT_GT(std::count_if(chosen.begin(), chosen.end(), [](const PlannedPose& p) { return p.payload == 2; }),
-            3);
+  EXPECT_GT(std::ranges::count(chosen, 2, &PlannedPose::payload), 3);
   EXPECT_LT(two.problem.log_fitness(chosen), one.problem.log_fitness(run(one)) - 1);
 }
 
@@ -588,7 +564,7 @@ TEST(Planner, TravelsLittleAndChangesThePayloadOnce) {
   const auto sorted = [](const PoseSet& s) {
     std::vector<std::string> rows;
     for (const PlannedPose& p : s) rows.push_back(to_json(PoseSet{p}).dump());
-    std::sort(rows.begin(), rows.end());
+    std::ranges::sort(rows);
     return rows;
   };
   EXPECT_EQ(sorted(ordered), sorted(set));

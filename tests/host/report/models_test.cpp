@@ -14,12 +14,7 @@
 
 namespace {
 
-using namespace flexcomp;
-using namespace flexcomp::host;
-using measuring::measure;
-using measuring::Measuring;
-using measuring::truth;
-using measuring::tx60l;
+using namespace measuring;
 
 std::map<ModelKind, ModelFit> by_kind(const std::vector<ModelFit>& list) {
   std::map<ModelKind, ModelFit> found;
@@ -27,12 +22,26 @@ std::map<ModelKind, ModelFit> by_kind(const std::vector<ModelFit>& list) {
   return found;
 }
 
+/// A row beside a fit to all others.
+struct LeftOut {
+  std::size_t identifiable;
+  double error_m;
+};
+
+LeftOut left_out(const Robot& robot, const std::vector<Observation>& rows, std::size_t k,
+                 IdentifyOptions options, ModelKind kind) {
+  std::vector<Observation> others = rows;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+  options.model = kind;
+  const Identification r = identify(robot, others, "data", options);
+  return {r.identifiable, residuals(r.fit.estimate, robot, {rows[k]}, "data")[0].position_m.norm()};
+}
+
 TEST(Models, RowsLeftOutAreThoseOfAFitWithoutThem) {
   const Robot robot = tx60l();
   const std::vector<Observation> rows = measure(robot, truth(), 25, 3, Measuring());
-  IdentifyOptions options;
-  options.estimator.robust = false;  // a weight that moves with the row is another question
-  options.physical = false;
+  const IdentifyOptions options =
+      plain_least_squares();  // a weight that moves with the row is another question
   const auto models = by_kind(compare_models(robot, rows, "data", options));
   ASSERT_EQ(models.size(), 4U);
   for (const ModelKind kind : {ModelKind::full, ModelKind::no_stiffness}) {
@@ -40,14 +49,8 @@ TEST(Models, RowsLeftOutAreThoseOfAFitWithoutThem) {
     ASSERT_TRUE(m.left_out.has_value());
     double sum = 0;
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      std::vector<Observation> others = rows;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      IdentifyOptions without = options;
-      without.model = kind;
-      const Identification r = identify(robot, others, "data", without);
-      ASSERT_EQ(r.identifiable, m.parameters);
-      const auto model = prepare(r.fit.estimate.set, robot, "data");
-      const double error = residuals(r.fit.estimate, *model, {rows[k]})[0].position_m.norm();
+      const auto [identifiable, error] = left_out(robot, rows, k, options, kind);
+      ASSERT_EQ(identifiable, m.parameters);
       EXPECT_NEAR(m.left_out_m[k], error, 0.01 * error + 2e-7) << "row " << k;
       sum += error;
     }
@@ -58,25 +61,16 @@ TEST(Models, RowsLeftOutAreThoseOfAFitWithoutThem) {
 
 TEST(Models, OfPositionsTooAndWithUnknownFrames) {
   const Robot robot = tx60l();
-  Measuring how;
-  how.pose = false;
+  Measuring how{.pose = false};
   const std::vector<Observation> rows = measure(robot, truth(), 40, 5, how);
-  IdentifyOptions options;
-  options.estimator.robust = false;
-  options.physical = false;
+  IdentifyOptions options = plain_least_squares();
   options.frames = FrameChoice::fit;
   const auto models = by_kind(compare_models(robot, rows, "data", options));
   ASSERT_TRUE(models.count(ModelKind::geometric));
   const ModelFit& m = models.at(ModelKind::geometric);
   ASSERT_TRUE(m.left_out.has_value());
   for (const std::size_t k : {0U, 11U, 39U}) {
-    std::vector<Observation> others = rows;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    IdentifyOptions without = options;
-    without.model = ModelKind::geometric;
-    const Identification r = identify(robot, others, "data", without);
-    const auto model = prepare(r.fit.estimate.set, robot, "data");
-    const double error = residuals(r.fit.estimate, *model, {rows[k]})[0].position_m.norm();
+    const double error = left_out(robot, rows, k, options, ModelKind::geometric).error_m;
     EXPECT_NEAR(m.left_out_m[k], error, 0.02 * error + 2e-7) << "row " << k;
   }
 }
@@ -110,10 +104,7 @@ TEST(Models, ARowThatAloneMakesAParameterKnownCannotBeLeftOut) {
   // The load hangs on at one pose only, and gravity turns no joint elsewhere: its compliances are known there alone.
   for (Observation& row : rows) row.context.payload_kg = 0;
   rows[4].context.payload_kg = robot.nominal.payload_kg;
-  IdentifyOptions options;
-  options.physical = false;
-  options.estimator.robust = false;
-  const auto models = by_kind(compare_models(robot, rows, "data", options));
+  const auto models = by_kind(compare_models(robot, rows, "data", plain_least_squares()));
   ASSERT_TRUE(models.count(ModelKind::no_gravity));
   EXPECT_FALSE(models.at(ModelKind::no_gravity).left_out.has_value());
   EXPECT_TRUE(models.at(ModelKind::geometric).left_out.has_value());

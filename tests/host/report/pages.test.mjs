@@ -37,9 +37,30 @@ function csv(file) {
   const [head, ...rows] = readFileSync(at(file), 'utf8').trim().split('\n').map((line) => line.split(','));
   return Object.fromEntries(head.map((name, k) => [name, rows.map((row) => Number(row[k]))]));
 }
+/** The joints of row k of a table. */
+const jointsAt = (table, k) => [1, 2, 3, 4, 5, 6].map((j) => table[`q${j}_deg`][k]);
+const jointsHead = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg';
 function dataOf(name) {
   const [, text] = readFileSync(at(name), 'utf8').match(/<script type="application\/json" id="data">(.*?)<\/script>/s);
   return readData(text);
+}
+
+/** Nothing is wider than the window. */
+async function expectToFit(page, where) {
+  const [wide, room] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+  assert.ok(wide <= room, `${where}: ${wide} px wide`);
+}
+const chooseError = (page, kind) => page.locator('.explore select').first().selectOption(kind);
+const sumOf = (list) => list.reduce((a, b) => a + b);
+
+/** A test on an opened page, on which nothing may go wrong. */
+function pageTest(name, file, body, options) {
+  test(name, async () => {
+    const {page, troubles, close} = await open(browser, at(file), options);
+    await body(page);
+    assert.deepEqual(troubles, []);
+    await close();
+  });
 }
 
 const longName = 'm'.repeat(78);
@@ -63,11 +84,10 @@ before(async () => {
   flexcomp('diagnose', '--robot', robot, '--data', 'hidden.csv', '--holdout', 'kept.csv', '-o', 'found.yaml', '--report',
     pages.diagnose);
   // The files of where an arm went: here the joints of the data with made-up errors, a row's own number among them.
-  const {q1_deg: q1, ...rest} = csv('others.csv');
-  const row = (k, size) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k]), size, 0, -size / (k + 1), k % 2].join(',');
-  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm,payload_kg';
+  const others = csv('others.csv');
+  const row = (k, size) => [...jointsAt(others, k), size, 0, -size / (k + 1), k % 2].join(',');
   for (const [name, size] of [['went_before.csv', 1], ['went_after.csv', 0.1]]) {
-    writeFileSync(at(name), `${[head, ...q1.map((_, k) => row(k, size))].join('\n')}\n`);
+    writeFileSync(at(name), `${[`${jointsHead},dx_mm,dy_mm,dz_mm,payload_kg`, ...others.q1_deg.map((_, k) => row(k, size))].join('\n')}\n`);
   }
   flexcomp('report', '--robot', robot, '--calibration', 'cal.yaml', '--errors', 'There=went_before.csv,went_after.csv',
     '--errors', 'Back=went_after.csv,went_after.csv', '--result', 'Others=validated.json', '--title', `</script><b>title ${longName}`,
@@ -78,7 +98,7 @@ before(async () => {
 after(() => browser?.close());
 
 test('the arm is drawn where the forward model has it', () => {
-  writeFileSync(at('one.csv'), 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,dx_mm,dy_mm,dz_mm\n0,0,0,0,0,0,1,0,0\n');
+  writeFileSync(at('one.csv'), `${jointsHead},dx_mm,dy_mm,dz_mm\n0,0,0,0,0,0,1,0,0\n`);
   const names = ['abb-irb120', 'kuka-kr6-r900', 'rx160l', 'tx60l', 'ur10', 'ur5'];
   // None of them has beta; one that has is made.
   const skewed = readFileSync(robot, 'utf8').replace(/(theta_deg:[^}]*?)(beta_deg: *[-\d.]+ *, *)?(min_deg)/g, '$1beta_deg: 7, $3');
@@ -87,14 +107,14 @@ test('the arm is drawn where the forward model has it', () => {
   for (const name of [...names, 'skewed']) {
     const file = name === 'skewed' ? at('skewed.yaml') : join(source, `host/robots/${name}.yaml`);
     // Inside the limits of all of them.
-    writeFileSync(at('joints.csv'), ['q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg', '10,20,-30,40,50,60', '-80,-35,25,-70,-20,100',
+    writeFileSync(at('joints.csv'), [jointsHead, '10,20,-30,40,50,60', '-80,-35,25,-70,-20,100',
       '0,0,0,0,0,0'].join('\n'));
     flexcomp('predict', '--robot', file, '--joints', 'joints.csv', '-o', 'there.csv', '--force');
     flexcomp('report', '--robot', file, '--errors', 'One=one.csv,one.csv', '-o', 'arm.html');
     const {arm} = dataOf('arm.html');
     const there = csv('there.csv');
     for (let k = 0; k < 3; ++k) {
-      const q = [1, 2, 3, 4, 5, 6].map((j) => (csv('joints.csv')[`q${j}_deg`][k] * Math.PI) / 180);
+      const q = jointsAt(csv('joints.csv'), k).map((v) => (v * Math.PI) / 180);
       const p = measuredPoint(arm, q);
       ['x_mm', 'y_mm', 'z_mm'].forEach((key, i) => assert.ok(Math.abs(p[i] * 1e3 - there[key][k]) < 1e-3,
         `${name}, pose ${k + 1}: ${p[i] * 1e3} and ${there[key][k]}`));
@@ -169,8 +189,7 @@ for (const [command, file] of Object.entries(pages)) {
     for (const [width, scheme] of all) {
       const {page, troubles, close} = await open(browser, at(file), {width, scheme});
       const where = `${command}, ${width} px, ${scheme}`;
-      const size = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
-      assert.ok(size[0] <= size[1], `${where}: ${size[0]} px wide`);
+      await expectToFit(page, where);
       const seen = await picture(page);
       assert.ok(seen.filled > 2000 && seen.colours > 20, `${where}: the arm is not to be seen: ${JSON.stringify(seen)}`);
       if (command !== 'plan') {
@@ -188,18 +207,17 @@ for (const [command, file] of Object.entries(pages)) {
         // The narrowest that there is, with every name as long as it may be.
         await page.setViewportSize({width: 320, height: 700});
         await settled(page);
-        const narrow = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth,
-          [...document.querySelectorAll('main *')].filter((e) => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('.scroll, svg'))
-            .map((e) => `${e.tagName}.${e.className}`).slice(0, 5)]);
-        assert.ok(narrow[0] <= narrow[1] && narrow[2].length === 0, `${command}, 320 px: ${narrow}`);
+        await expectToFit(page, `${command}, 320 px`);
+        const outside = await page.evaluate(() => [...document.querySelectorAll('main *')]
+          .filter((e) => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('.scroll, svg')).map((e) => `${e.tagName}.${e.className}`));
+        assert.deepEqual(outside, [], `${command}, 320 px`);
       }
       await close();
     }
   });
 }
 
-test('before, after, and how long they are drawn', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.identify));
+pageTest('before, after, and how long they are drawn', pages.identify, async (page) => {
   const words = () => page.textContent('.scale');
   const times = async () => Number((await words()).match(/drawn ([\d,]+) times/)[1].replaceAll(',', ''));
   const chooseErrors = async (which) => {
@@ -223,12 +241,9 @@ test('before, after, and how long they are drawn', async () => {
   // One square of the grid in mm of error follows from the two numbers beside it.
   const [, square, error] = (await words()).match(/grid: ([\d.]+) mm of the arm, ([\d.]+) mm of error/);
   assert.ok(Math.abs(Number(square) / await times() / Number(error) - 1) < 0.01, await words());
-  assert.deepEqual(troubles, []);
-  await close();
 });
 
-test('the view turns, comes nearer, and goes to a pose', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.identify));
+pageTest('the view turns, comes nearer, and goes to a pose', pages.identify, async (page) => {
   const seen = [(await picture(page)).sum];
   const change = async (what, action) => {
     await action();
@@ -256,18 +271,15 @@ test('the view turns, comes nearer, and goes to a pose', async () => {
   const start = await scrolled();
   await page.mouse.wheel(0, 100);
   await page.waitForFunction((y) => scrollY > y, start);
-  assert.deepEqual(troubles, []);
-  await close();
 });
 
-test('errors against everything that was recorded, and a dot that is clicked', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.identify));
+pageTest('errors against everything that was recorded, and a dot that is clicked', pages.identify, async (page) => {
   const against = page.locator('.explore select').nth(1);
   const names = await against.locator('option').allTextContents();
   for (const wanted of ['q1 [deg]', 'q2 [deg]', 'q3 [deg]', 'q4 [deg]', 'q5 [deg]', 'q6 [deg]', 'payload [kg]',
     'temperature [°C]', 'time since the first row [s]', 'order of the data']) assert.ok(names.includes(wanted), `${wanted} of ${names}`);
   for (const kind of ['size', 'x', 'turned']) {
-    await page.locator('.explore select').first().selectOption(kind);
+    await chooseError(page, kind);
     for (let k = 0; k < names.length; ++k) {
       await against.selectOption(String(k));
       await settled(page);
@@ -276,7 +288,7 @@ test('errors against everything that was recorded, and a dot that is clicked', a
     assert.equal(await marks(page, '.histogram'), 32);
   }
   // Every dot says its pose, and is where that pose's value is; clicked, the arm goes there.
-  await page.locator('.explore select').first().selectOption('size');
+  await chooseError(page, 'size');
   await against.selectOption({label: 'q1 [deg]'});
   const {q1_deg: values} = csv('fitted.csv');
   const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -309,36 +321,31 @@ test('errors against everything that was recorded, and a dot that is clicked', a
     }
   }
   assert.ok(clicked >= 2, 'no dot was found');
-  assert.deepEqual(troubles, []);
-  await close();
 });
 
-test('a component has no logarithm, and what is left has classes of its own', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.identify));
+pageTest('a component has no logarithm, and what is left has classes of its own', pages.identify, async (page) => {
   const {sets: [set]} = dataOf(pages.identify);
   const box = page.getByLabel('logarithmic');
   const panels = () => page.locator('.histogram svg').count();
   assert.ok(await box.isChecked());
   assert.equal(await panels(), 1);
   for (const kind of ['x', 'y', 'z']) {
-    await page.locator('.explore select').first().selectOption(kind);
+    await chooseError(page, kind);
     assert.ok(await box.isDisabled() && !(await box.isChecked()), kind);
     assert.equal(await panels(), 2, 'before and after by themselves: the one is a single bar among the classes of the other');
     for (const which of ['before', 'after']) {
       const values = Array.from({length: 60}, (_, k) => set.error(which, k)['xyz'.indexOf(kind)]);
       const {edges, counts} = set.histogram(kind, which, false);
       assert.ok(edges[0] <= Math.min(...values) + 1e-4 && edges.at(-1) >= Math.max(...values) - 1e-4);
-      assert.equal(counts[which].reduce((a, b) => a + b), 60);
+      assert.equal(sumOf(counts[which]), 60);
       assert.ok(counts[which].filter((n) => n > 0).length >= 6, `${kind} ${which}: ${counts[which]}`);
     }
   }
   await page.check('.explore .choice input[value=after]', {force: true});
   assert.equal(await panels(), 1);
   assert.match(await page.getAttribute('.histogram', 'aria-label'), /of 60 poses: after most often from/);
-  await page.locator('.explore select').first().selectOption('size');
+  await chooseError(page, 'size');
   assert.ok(await box.isChecked() && await box.isEnabled());
-  assert.deepEqual(troubles, []);
-  await close();
 });
 
 test('numbers keep their digits and ticks their length', () => {
@@ -368,8 +375,7 @@ test('a lost context comes back with its picture', async () => {
   await close();
 });
 
-test('by keyboard and to those who listen', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.identify), {width: 800});
+pageTest('by keyboard and to those who listen', pages.identify, async (page) => {
   const seen = new Set([(await picture(page)).sum]);
   await page.focus('.stage canvas');
   for (const key of ['ArrowLeft', 'ArrowUp', '+', '-']) {
@@ -415,16 +421,12 @@ test('by keyboard and to those who listen', async () => {
   assert.match(await page.textContent('.view3d .readout'), new RegExp(`^Pose ${number} of 60`));
   const place = (kind) => page.locator(`.scatter .ring.${kind}`).first().evaluate((e) => [e.cx.baseVal.value, e.cy.baseVal.value]);
   assert.deepEqual(await place('chosen'), await place('found'));
-  assert.deepEqual(troubles, []);
-  await close();
-});
+}, {width: 800});
 
 test('rows that lie apart are marked, and errors that cannot be seen are spoken of', async () => {
-  const head = 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg';
-  const {q1_deg: q1, ...rest} = csv('fitted.csv');
-  const joints = (k) => [q1[k], ...[2, 3, 4, 5, 6].map((j) => rest[`q${j}_deg`][k])].join(',');
-  const write = (name, error) => writeFileSync(at(name), `${[`${head},dx_mm,dy_mm,dz_mm`,
-    ...q1.slice(0, 20).map((_, k) => `${joints(k)},${error(k)}`)].join('\n')}\n`);
+  const fitted = csv('fitted.csv');
+  const write = (name, error) => writeFileSync(at(name), `${[`${jointsHead},dx_mm,dy_mm,dz_mm`,
+    ...Array.from({length: 20}, (_, k) => `${jointsAt(fitted, k)},${error(k)}`)].join('\n')}\n`);
   write('good.csv', (k) => `${0.1 + 0.01 * k},0,0`);
   write('bad.csv', (k) => `${3 + k},1,0`);
   write('tiny.csv', (k) => `${1e-7 * (k + 1)},0,0`);
@@ -476,8 +478,7 @@ test('a study: a wide remark wraps, on paper too', async () => {
   for (const [width, media] of [[320, 'screen'], [700, 'print']]) {
     const {page, troubles, close} = await open(browser, at('study.html'), {width});
     await page.emulateMedia({media});
-    const size = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
-    assert.ok(size[0] <= size[1], `${media}: ${size}`);
+    await expectToFit(page, media);
     // Words of the other columns stay whole.
     const lines = await page.locator('tbody th').evaluateAll((cells) =>
       cells.map((e) => { const r = document.createRange(); r.selectNodeContents(e); return r.getClientRects().length; }));
@@ -525,16 +526,13 @@ test('the plan has beams, bodies and all its poses', async () => {
   await known.close();
 });
 
-test('several sets: one is chosen, each has its own plots', async () => {
-  const {page, troubles, close} = await open(browser, at(pages.report));
+pageTest('several sets: one is chosen, each has its own plots', pages.report, async (page) => {
   assert.equal(await page.locator('.explore svg').count(), 4);
   assert.deepEqual(dataOf(pages.report).sets.map((s) => s.covariates.some((c) => c.name === 'payload [kg]')), [true, true]);
   const first = await picture(page);
   await page.locator('.view3d select').selectOption({label: 'Back'});
   await settled(page);
   assert.notEqual((await picture(page)).sum, first.sum);
-  assert.deepEqual(troubles, []);
-  await close();
 });
 
 test('on paper: drawings for plots, no buttons, light in a dark room too', async () => {
@@ -547,8 +545,7 @@ test('on paper: drawings for plots, no buttons, light in a dark room too', async
     await settled(page);
     assert.equal(await shown(page, '.explore, .controls'), 0);
     if (command !== 'plan') assert.ok(await shown(page, '.still svg') >= 9, `${command}: drawings for paper`);
-    const width = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
-    assert.ok(width[0] <= width[1], `${command}: ${width[0]} px wide on paper`);
+    await expectToFit(page, `${command} on paper`);
     const seen = await picture(page);
     assert.ok(seen.filled > 2000);
     const paper = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
@@ -627,7 +624,7 @@ test('three thousand poses stay below the limit, and more do too', async () => {
     assert.ok(set.count === 3000 || (poses > 3000 && set.count >= 1000), `${set.count}`);
     for (const kind of ['size', 'x', 'turned']) {
       for (const {counts} of [set.histogram(kind, 'both', false), set.histogram(kind, 'after', false)]) {
-        for (const list of Object.values(counts)) assert.equal(list.reduce((a, b) => a + b), poses);
+        for (const list of Object.values(counts)) assert.equal(sumOf(list), poses);
       }
     }
     const {page, troubles, close} = await open(browser, at('many.html'), {width: 390});

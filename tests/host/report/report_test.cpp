@@ -13,16 +13,15 @@
 #include <utility>
 #include <vector>
 
-#include "files/robot_file.hpp"
 #include "report/html.hpp"
 #include "report/page.hpp"
-#include "report/parameters.hpp"
 #include "report/plots.hpp"
+#include "report/pose_errors.hpp"
 #include "report/results.hpp"
-#include "report/shown_poses.hpp"
 #include "report/style.hpp"
 #include "report/web_bundle.hpp"
 #include "report/web_data.hpp"
+#include "support/robot_files.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -60,6 +59,13 @@ Page example(std::size_t count) {
   page.confounded = {{"base.z_mm", {"link1.d_mm"}}, {"joint_compliance[joint=1].rad_per_nm", {}}};
   page.made_by = "flexcomp";
   return page;
+}
+
+/// All of these are in a text, and none of those.
+void expect_parts(const std::string& text, const std::vector<std::string>& wanted,
+                  const std::vector<std::string>& never = {}) {
+  for (const std::string& part : wanted) EXPECT_THAT(text, HasSubstr(part));
+  for (const std::string& part : never) EXPECT_THAT(text, Not(HasSubstr(part)));
 }
 
 std::size_t occurrences(const std::string& text, const std::string& what) {
@@ -142,22 +148,21 @@ TEST(Report, ShownPosesAreTheLargestAndAnEvenPartOfTheRest) {
     for (PagePose& p : poses) p.after_m = {size(random), -size(random), size(random)};
     const std::vector<std::size_t> shown = shown_poses(poses, 100);
     EXPECT_EQ(shown.size(), std::min<std::size_t>(count, 100));
-    EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end()));
-    EXPECT_EQ(std::adjacent_find(shown.begin(), shown.end()), shown.end()) << "none twice";
+    EXPECT_TRUE(std::ranges::is_sorted(shown));
+    EXPECT_EQ(std::ranges::adjacent_find(shown), shown.end()) << "none twice";
     std::vector<std::size_t> by_size(count);
     for (std::size_t k = 0; k < count; ++k) by_size[k] = k;
     const auto length = [&](std::size_t k) {
       return std::hypot(poses[k].after_m[0], poses[k].after_m[1], poses[k].after_m[2]);
     };
-    std::sort(by_size.begin(), by_size.end(),
-              [&](std::size_t a, std::size_t b) { return length(a) > length(b); });
+    std::ranges::sort(by_size, [&](std::size_t a, std::size_t b) { return length(a) > length(b); });
     for (std::size_t k = 0; k < std::min<std::size_t>(count, 5); ++k)
-      EXPECT_TRUE(std::binary_search(shown.begin(), shown.end(), by_size[k])) << k;
+      EXPECT_TRUE(std::ranges::binary_search(shown, by_size[k])) << k;
     if (count < 5000) continue;
     // Every tenth of the data has its part.
     for (std::size_t from = 0; from < count; from += count / 10) {
-      const auto low = std::lower_bound(shown.begin(), shown.end(), from);
-      const auto high = std::lower_bound(shown.begin(), shown.end(), from + count / 10);
+      const auto low = std::ranges::lower_bound(shown, from);
+      const auto high = std::ranges::lower_bound(shown, from + count / 10);
       EXPECT_GE(high - low, 7) << from;
     }
   }
@@ -259,10 +264,8 @@ TEST(Report, EscapesWhatPeopleAndFilesSay) {
   EXPECT_EQ(unbalanced(without_scripts(html(page), has_web_parts() ? 2 : 0)), "");
   const std::string text = html(page, false);
   EXPECT_EQ(unbalanced(text), "");
-  EXPECT_THAT(text, Not(HasSubstr("<script")));
-  EXPECT_THAT(text, Not(HasSubstr("javascript:")));
-  EXPECT_THAT(text, Not(HasSubstr("elsewhere")));
-  EXPECT_THAT(text, HasSubstr("&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &amp; &quot;more&quot;"));
+  expect_parts(text, {"&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &amp; &quot;more&quot;"},
+               {"<script", "javascript:", "elsewhere"});
 }
 
 TEST(Report, ShowsTheNumbersThatWerePutIn) {
@@ -276,14 +279,11 @@ TEST(Report, ShowsTheNumbersThatWerePutIn) {
               HasSubstr("<span class=\"before\">5.00 mm</span> → <span class=\"after\">0.0500 mm</span>"));
   EXPECT_THAT(text, HasSubstr("100.0 ×"));
   EXPECT_THAT(text, Not(HasSubstr("mean [deg]"))) << "no orientation is known";
-  EXPECT_THAT(text,
-              HasSubstr("<td>-0.08012</td><td>0.00034</td><td class=\"text\">deg</td><td>236</td></tr>"));
-  EXPECT_THAT(
-      text,
-      HasSubstr(
-          "<tr class=\"pale\"><th scope=\"row\">joint_compliance[joint=2].rad_per_nm</th><td>1.5e-5</td>"
-          "<td>1.3e-5</td><td class=\"text\">rad/(N·m)</td>"));
-  EXPECT_THAT(text, HasSubstr("<code>base.z_mm</code>: absorbed by <code>link1.d_mm</code>"));
+  expect_parts(
+      text, {"<td>-0.08012</td><td>0.00034</td><td class=\"text\">deg</td><td>236</td></tr>",
+             "<tr class=\"pale\"><th scope=\"row\">joint_compliance[joint=2].rad_per_nm</th><td>1.5e-5</td>"
+             "<td>1.3e-5</td><td class=\"text\">rad/(N·m)</td>",
+             "<code>base.z_mm</code>: absorbed by <code>link1.d_mm</code>"});
   // The one that carries says so in the table too.
   page.parameters.push_back({"link1.d_mm", 0.4, 0.01});
   EXPECT_THAT(html(page, false),
@@ -315,6 +315,14 @@ std::vector<double> coordinates(const std::string& svg) {
     at = end;
   }
   return found;
+}
+
+void expect_inside_the_frame(const std::string& svg) {
+  EXPECT_EQ(unbalanced(svg), "");
+  for (const double v : coordinates(svg)) {
+    ASSERT_GE(v, 0) << svg;
+    ASSERT_LE(v, 360) << svg;
+  }
 }
 
 /// Where the dots of a drawing are: "M1 2h0", and from there "m-3-4h0".
@@ -349,11 +357,7 @@ TEST(Report, EverythingIsDrawnInsideTheFrame) {
       {std::vector<double>(2000, 0.1), std::vector<double>(2000, 99.0), "mm", 0.06}};
   for (const ErrorPairs& errors : cases) {
     for (const std::string& svg : {plot_in_order(errors), plot_sorted(errors), plot_histogram(errors)}) {
-      EXPECT_EQ(unbalanced(svg), "");
-      for (const double v : coordinates(svg)) {
-        ASSERT_GE(v, 0) << svg;
-        ASSERT_LE(v, 360) << svg;
-      }
+      expect_inside_the_frame(svg);
       EXPECT_LT(occurrences(svg, "class=\"tick\""), 40U) << svg;
     }
   }
@@ -522,8 +526,8 @@ TEST(Report, CurvesStandOutInEveryScheme) {
       EXPECT_GE(contrast, 3) << name;
       seen.push_back(colour(name));
     }
-    std::sort(seen.begin(), seen.end());
-    EXPECT_EQ(std::adjacent_find(seen.begin(), seen.end()), seen.end());
+    std::ranges::sort(seen);
+    EXPECT_EQ(std::ranges::adjacent_find(seen), seen.end());
   }
 }
 
@@ -546,7 +550,7 @@ TEST(Report, OfManyPosesTheWorstAreDrawnAndTheRestIsSaid) {
     std::vector<double> heights;
     heights.reserve(found.size());
     for (const auto& [x, y] : found) heights.push_back(y);
-    std::sort(heights.begin(), heights.end());
+    std::ranges::sort(heights);
     EXPECT_GT(heights[1] - heights[0], 20) << which << ": the one that is far off";
   }
   const std::string text = html(page, false);
@@ -599,7 +603,7 @@ TEST(Report, HistogramsOfTheScriptCountAllPoses) {
     }
     // Of what is left alone the classes are its own: more than one has poses.
     const auto alone = of.at("after").at("counts").at(0).get<std::vector<std::size_t>>();
-    EXPECT_GT(std::count_if(alone.begin(), alone.end(), [](std::size_t n) { return n > 0; }), 8) << kind;
+    EXPECT_GT(std::ranges::count_if(alone, [](std::size_t n) { return n > 0; }), 8) << kind;
   }
 }
 
@@ -621,9 +625,7 @@ TEST(Report, SmallAndFarNumbersKeepTheirDigits) {
   }
   // Whatever it is, it is not nothing.
   const std::string text = html(page, false);
-  EXPECT_THAT(text, Not(HasSubstr("0.00000")));
-  EXPECT_THAT(text, HasSubstr(" nm</span>"));
-  EXPECT_THAT(text, HasSubstr("&gt; 1000 × smaller"));
+  expect_parts(text, {" nm</span>", "&gt; 1000 × smaller"}, {"0.00000"});
   set.exact = true;
   EXPECT_THAT(html(page, false), Not(HasSubstr("× smaller")));
 }
@@ -633,9 +635,7 @@ TEST(Report, ErrorsThatGrowRaiseTheAlarm) {
   EXPECT_THAT(html(page, false), Not(HasSubstr("Do not rely")));
   for (PagePose& p : page.poses[0].poses) std::swap(p.before_m, p.after_m);
   const std::string text = html(page, false);
-  EXPECT_THAT(text, HasSubstr("Do not rely on this yet"));
-  EXPECT_THAT(text, HasSubstr("larger after than before"));
-  EXPECT_THAT(text, HasSubstr("× larger</td>"));
+  expect_parts(text, {"Do not rely on this yet", "larger after than before", "× larger</td>"});
 }
 
 TEST(Report, WhatLiesFarFromTheRestIsMarked) {
@@ -699,7 +699,6 @@ TEST(Report, WhatCarriesIsAColumnWhereSomethingListedCarries) {
 }
 
 TEST(Report, FramesAreAmongTheParameters) {
-  const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
   Calibration calibration;
   calibration.frames.emplace();
   calibration.frames->f.position_m = {2.1, -0.3, 0.05};
@@ -711,10 +710,9 @@ TEST(Report, FramesAreAmongTheParameters) {
   calibration.covariance->factor = Eigen::MatrixXd::Zero(3, 3);
   calibration.covariance->factor << 3e-5, 0, 0, 0, radians(0.004), 0, 3e-5, 0, 4e-5;
   Page page;
-  add_parameters(page, calibration, robot);
+  add_parameters(page, calibration, support::tx60l());
   const auto find = [&](const std::string& name) {
-    const auto at = std::find_if(page.parameters.begin(), page.parameters.end(),
-                                 [&](const PageParameter& p) { return p.name == name; });
+    const auto at = std::ranges::find(page.parameters, name, &PageParameter::name);
     return at == page.parameters.end() ? PageParameter{"none", 0, std::nullopt} : *at;
   };
   EXPECT_NEAR(find("frame_f.x_mm").value, 2100, 1e-9);
@@ -726,31 +724,27 @@ TEST(Report, FramesAreAmongTheParameters) {
 }
 
 TEST(Report, OneStepIsNoCourse) {
-  const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
   Diagnosis d;
   d.error_before.rms_m = d.error_after.rms_m = 5e-5;
   d.steps = {{"the model at the start", 5e-5, 1.0, 1.1}};
   d.places = {{}, {}};
   d.places_left = d.places;
-  const std::string nothing = html(page_of(d, {}, robot, "data.csv", std::nullopt), false);
-  EXPECT_THAT(nothing, Not(HasSubstr("<svg")));
-  EXPECT_THAT(nothing, Not(HasSubstr("after each step")));
-  EXPECT_THAT(nothing, Not(HasSubstr("Blue")));
-  EXPECT_THAT(nothing, HasSubstr("chi-square, left-out poses"));
+  const std::string nothing = html(page_of(d, {}, support::tx60l(), "data.csv", std::nullopt), false);
+  expect_parts(nothing, {"chi-square, left-out poses"}, {"<svg", "after each step", "Blue"});
   d.error_after.rms_m = 4e-5;
   d.noise_floor_m = 1e-5;
   d.places[0].explains = 0.8;
   d.steps.push_back({"something added", 4e-5, 1.0, 1.1});
-  EXPECT_EQ(occurrences(html(page_of(d, {}, robot, "data.csv", std::nullopt), false), "<svg"), 2U);
+  EXPECT_EQ(occurrences(html(page_of(d, {}, support::tx60l(), "data.csv", std::nullopt), false), "<svg"), 2U);
 }
 
 TEST(Report, TheModelsSayWhatTheyWereFittedWithout) {
-  const Robot robot = load_robot(FLEXCOMP_SOURCE_DIR "/host/robots/tx60l.yaml");
   const std::string words =
       "fitted anew to these rows, without the fixed parameters and tolerances of this run.";
   const Identification r;
-  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, true), false), HasSubstr(words));
-  EXPECT_THAT(html(page_of(r, {}, robot, "data.csv", {ModelFit{}}, false), false),
+  EXPECT_THAT(html(page_of(r, {}, support::tx60l(), "data.csv", {ModelFit{}}, true), false),
+              HasSubstr(words));
+  EXPECT_THAT(html(page_of(r, {}, support::tx60l(), "data.csv", {ModelFit{}}, false), false),
               Not(HasSubstr("the fixed parameters")));
 }
 
@@ -804,13 +798,8 @@ TEST(Report, CurvesAndBarsAreDrawnInsideTheFrame) {
   drawings.push_back(plot_bars({"Ten", "mm", std::vector<std::string>(10, "link3.theta"),
                                 std::vector<double>(10, 0.8), std::vector<double>(10, 0.3)}));
   for (const std::string& svg : drawings) {
-    EXPECT_EQ(unbalanced(svg), "");
-    EXPECT_THAT(svg, Not(HasSubstr("nan")));
-    EXPECT_THAT(svg, Not(HasSubstr("inf")));
-    for (const double v : coordinates(svg)) {
-      ASSERT_GE(v, 0) << svg;
-      ASSERT_LE(v, 360) << svg;
-    }
+    expect_inside_the_frame(svg);
+    expect_parts(svg, {}, {"nan", "inf"});
   }
   EXPECT_EQ(plot_curves({"Empty", "x", "y", {}, false, {}}), "");
   // Steps hold their value until the next: no slanting line.

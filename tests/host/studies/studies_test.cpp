@@ -45,7 +45,7 @@ const StudyRow& row(const Study& study, const std::vector<std::string>& labels) 
   for (const StudyRow& r : study.rows) {
     bool all = true;
     for (const std::string& wanted : labels)
-      all = all && std::find(r.labels.begin(), r.labels.end(), wanted) != r.labels.end();
+      all = all && std::ranges::find(r.labels, wanted) != r.labels.end();
     if (all) return r;
   }
   ADD_FAILURE() << "no row with " << labels.back();
