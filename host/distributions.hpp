@@ -2,8 +2,7 @@
 /// \file
 /// Quantiles and tail probabilities of the distributions that decisions here rest on. Behind plain functions, because
 /// Boost.Math costs every source that includes it ten seconds to compile.
-#ifndef FLEXCOMP_HOST_DISTRIBUTIONS_HPP
-#define FLEXCOMP_HOST_DISTRIBUTIONS_HPP
+#pragma once
 
 namespace flexcomp::host {
 
@@ -21,5 +20,3 @@ double chi2_above(double chi2, double degrees_of_freedom);
 double fisher_f_above(double f, double numerator_dof, double denominator_dof);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What an error is about. Library code names no options: commands/hints.cpp adds them by these codes.
-#ifndef FLEXCOMP_HOST_ERROR_CODE_HPP
-#define FLEXCOMP_HOST_ERROR_CODE_HPP
+#pragma once
 
 namespace flexcomp::host {
 
@@ -58,5 +57,3 @@ enum class ErrorCode {
 };
 
 }  // namespace flexcomp::host
-
-#endif

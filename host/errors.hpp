@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Failures of the calibrator and the exit status of each (mapped in run() of commands/ only).
-#ifndef FLEXCOMP_HOST_ERRORS_HPP
-#define FLEXCOMP_HOST_ERRORS_HPP
+#pragma once
 
 #include <stdexcept>
 
@@ -55,5 +54,3 @@ class DoubtfulResult : public CodedError {
 };
 
 }  // namespace flexcomp::host
-
-#endif

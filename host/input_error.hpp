@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Input that is refused: which file, which line, which field, what was expected there and what was found.
-#ifndef FLEXCOMP_HOST_INPUT_ERROR_HPP
-#define FLEXCOMP_HOST_INPUT_ERROR_HPP
+#pragma once
 
 #include <cstddef>
 #include <stdexcept>
@@ -39,5 +38,3 @@ class InputError : public std::runtime_error {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Confidence interval.
-#ifndef FLEXCOMP_HOST_INTERVAL_HPP
-#define FLEXCOMP_HOST_INTERVAL_HPP
+#pragma once
 
 namespace flexcomp::host {
 
@@ -13,5 +12,3 @@ struct Interval {
 };
 
 }  // namespace flexcomp::host
-
-#endif

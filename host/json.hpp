@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// JSON of results and of stored searches: keys in the order in which they were written. Instantiated once (json.cpp).
-#ifndef FLEXCOMP_HOST_JSON_HPP
-#define FLEXCOMP_HOST_JSON_HPP
+#pragma once
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -22,5 +21,3 @@ Json json_list(const List& list, const Of& of) {
 }
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Enumerators by the name that options, JSON and stored states give them.
-#ifndef FLEXCOMP_HOST_NAMED_VALUES_HPP
-#define FLEXCOMP_HOST_NAMED_VALUES_HPP
+#pragma once
 
 #include <map>
 #include <stdexcept>
@@ -34,5 +33,3 @@ const std::string& name_in(const NamedValues<Value>& names, Value value) {
 }
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Nearest known name by edit distance, for "did you mean" messages.
-#ifndef FLEXCOMP_HOST_NEAREST_HPP
-#define FLEXCOMP_HOST_NEAREST_HPP
+#pragma once
 
 #include <span>
 #include <string>
@@ -18,5 +17,3 @@ std::string expected_name(std::string_view wrong, std::span<const std::string> k
                           std::string_view a_known);
 
 }  // namespace flexcomp::host
-
-#endif

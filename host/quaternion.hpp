@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Quaternions of files (Hamilton, w x y z) and rotation vectors.
-#ifndef FLEXCOMP_HOST_QUATERNION_HPP
-#define FLEXCOMP_HOST_QUATERNION_HPP
+#pragma once
 
 #include <Eigen/Geometry>
 #include <array>
@@ -25,5 +24,3 @@ Eigen::Quaterniond unit_quaternion(const Eigen::Matrix3d& rotation);
 Eigen::Vector3d rotation_between(const Eigen::Matrix3d& to, const Eigen::Matrix3d& from);
 
 }  // namespace flexcomp::host
-
-#endif

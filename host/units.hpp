@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Units of files, and conversion between text and SI. Inside everything is SI.
-#ifndef FLEXCOMP_HOST_UNITS_HPP
-#define FLEXCOMP_HOST_UNITS_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -50,5 +49,3 @@ double tidied(double si, const Unit& unit);
 std::string format_si(double si, const Unit& unit);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file Bus ports: connect the firmware's servers to sockets and serial devices of Linux. A port lists the
 /// descriptors to poll and serves without blocking.
-#ifndef FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
-#define FLEXCOMP_HIL_CONTROLLER_PORTS_HPP
+#pragma once
 
 #include <poll.h>
 
@@ -102,5 +101,3 @@ class RtuPort final : public Port {
 };
 
 }  // namespace flexcomp::hil
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Non-volatile memory as a file: two consecutive slots, erased bytes 0xFF, every write synced to disk. Each byte is
 /// written once between two erases, as on flash.
-#ifndef FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
-#define FLEXCOMP_HIL_CONTROLLER_SLOT_FILE_HPP
+#pragma once
 
 #include <cstdint>
 #include <string>
@@ -34,5 +33,3 @@ class SlotFile {
 };
 
 }  // namespace flexcomp::hil
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Readers of robot, truth and CSV files, independent of the host's. Unknown keys are refused.
-#ifndef FLEXCOMP_PLANT_FILES_HPP
-#define FLEXCOMP_PLANT_FILES_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -38,5 +37,3 @@ class Table {
 };
 
 }  // namespace plant
-
-#endif

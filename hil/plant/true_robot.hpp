@@ -2,8 +2,7 @@
 /// \file True robot of a closed loop: nominal chain plus hidden errors, unknown to the calibrator. Implemented
 /// from docs/model.md and Chen et al. 2019 on KDL's frames; it shares no code with the core, so that each
 /// validates the other. SI inside.
-#ifndef FLEXCOMP_PLANT_TRUE_ROBOT_HPP
-#define FLEXCOMP_PLANT_TRUE_ROBOT_HPP
+#pragma once
 
 #include <array>
 #include <kdl/frames.hpp>
@@ -81,5 +80,3 @@ KDL::Frame drawn(const Nominal& nominal, const JointVector& q_rad);
 double angle_of(const KDL::Rotation& rotation);
 
 }  // namespace plant
-
-#endif

@@ -9,8 +9,7 @@
 /// The defaults are those of the standards (Modbus messaging on TCP/IP 1.0b, 4.4.1; serial line 1.02, 2.5.1). An IPv6
 /// address stands in square brackets. A serial line's fields are read from the right, so a DEVICE may contain
 /// colons; a single number of at most 247 is a UNIT, a larger one a BAUD.
-#ifndef FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
-#define FLEXCOMP_HOST_BUS_BUS_ADDRESS_HPP
+#pragma once
 
 #include <cstdint>
 #include <string>
@@ -51,5 +50,3 @@ struct BusAddress {
 BusAddress parse_bus_address(std::string_view text);
 
 }  // namespace flexcomp::host
-
-#endif

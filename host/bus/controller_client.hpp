@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Client of a controller, the same protocol on Modbus and CANopen (flexcomp/wire/store_state.hpp).
-#ifndef FLEXCOMP_HOST_BUS_CONTROLLER_CLIENT_HPP
-#define FLEXCOMP_HOST_BUS_CONTROLLER_CLIENT_HPP
+#pragma once
 
 #include <chrono>
 #include <cstddef>
@@ -145,5 +144,3 @@ std::string describe(wire::Command command);
 std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// File descriptor that is closed by its destructor.
-#ifndef FLEXCOMP_HOST_BUS_DESCRIPTOR_HPP
-#define FLEXCOMP_HOST_BUS_DESCRIPTOR_HPP
+#pragma once
 
 #include <unistd.h>
 
@@ -36,5 +35,3 @@ class Descriptor {
 };
 
 }  // namespace flexcomp::host
-
-#endif

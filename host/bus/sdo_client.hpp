@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Client of a CANopen SDO channel (CiA 301, 7.2.4): expedited and segmented transfers over a CAN socket.
-#ifndef FLEXCOMP_HOST_BUS_SDO_CLIENT_HPP
-#define FLEXCOMP_HOST_BUS_SDO_CLIENT_HPP
+#pragma once
 
 #include <array>
 #include <chrono>
@@ -70,5 +69,3 @@ class SdoClient {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Transfer of parameter sets to and from a controller.
-#ifndef FLEXCOMP_HOST_BUS_TRANSFER_HPP
-#define FLEXCOMP_HOST_BUS_TRANSFER_HPP
+#pragma once
 
 #include <cstdint>
 #include <optional>
@@ -56,5 +55,3 @@ Calibration calibration_held(const ControllerClient& client, std::span<const std
 std::optional<Bytes> read_image_file(const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What is answered to targets, by the host (compensate) or by the controller (probe): one file format for both.
-#ifndef FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP
-#define FLEXCOMP_HOST_COMMANDS_ANSWERS_HPP
+#pragma once
 
 #include <array>
 #include <string>
@@ -23,5 +22,3 @@ Json answers_summary(const std::vector<std::array<double, joint_count>>& command
                      const std::vector<Answer>& answers);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Options that the commands which talk to a controller have in common.
-#ifndef FLEXCOMP_HOST_COMMANDS_BUS_OPTIONS_HPP
-#define FLEXCOMP_HOST_COMMANDS_BUS_OPTIONS_HPP
+#pragma once
 
 #include <CLI/CLI.hpp>
 #include <memory>
@@ -26,5 +25,3 @@ struct BusOptions : CommonOptions {
 void add_optional_robot_option(CLI::App& app, std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Colour on a terminal, and nothing but the text anywhere else: in a pipe, in a file, where NO_COLOR is set
 /// (no-color.org) or the terminal is a dumb one.
-#ifndef FLEXCOMP_HOST_COMMANDS_COLOUR_HPP
-#define FLEXCOMP_HOST_COMMANDS_COLOUR_HPP
+#pragma once
 
 #include <string>
 
@@ -22,5 +21,3 @@ std::string painted(const std::string& text, Colour colour, int stream);
 void print_message(const std::string& label, Colour colour, const std::string& text);
 
 }  // namespace flexcomp::host
-
-#endif

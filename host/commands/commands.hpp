@@ -8,8 +8,7 @@
 /// - Pages in report/: RESULT_page or results.hpp.
 /// - Text for the terminal here: RESULT_text; only commands/ knows colours and option names.
 /// - Errors of library code carry a code (error_code.hpp); hints.cpp adds the options and hints that belong to it.
-#ifndef FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
-#define FLEXCOMP_HOST_COMMANDS_COMMANDS_HPP
+#pragma once
 
 namespace CLI {
 class App;
@@ -39,5 +38,3 @@ void add_import(CLI::App& app);
 void add_completion(CLI::App& app);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// What the options of commands have in common: those that every command has, checks of numbers and of files that are
 /// named twice, and the two ways in which a command speaks: text for people, JSON for machines.
-#ifndef FLEXCOMP_HOST_COMMANDS_COMMON_OPTIONS_HPP
-#define FLEXCOMP_HOST_COMMANDS_COMMON_OPTIONS_HPP
+#pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -80,5 +79,3 @@ CLI::Validator non_negative_number();
 CLI::Validator number_between(double low, double high);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Errors as the terminal shows them: with the options that are concerned, and what to do next.
-#ifndef FLEXCOMP_HOST_COMMANDS_HINTS_HPP
-#define FLEXCOMP_HOST_COMMANDS_HINTS_HPP
+#pragma once
 
 #include <CLI/CLI.hpp>
 #include <exception>
@@ -26,5 +25,3 @@ std::string hint(const std::exception& error, const std::string& command);
 std::string usage_hint(const CLI::App& app, const std::vector<std::string>& arguments);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The half of `import` that makes a data file of an instrument's export and a robot's log.
-#ifndef FLEXCOMP_HOST_COMMANDS_IMPORT_MEASUREMENTS_HPP
-#define FLEXCOMP_HOST_COMMANDS_IMPORT_MEASUREMENTS_HPP
+#pragma once
 
 #include <CLI/CLI.hpp>
 #include <optional>
@@ -48,5 +47,3 @@ struct ImportMeasurements {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Programs of robot makers as targets of `compensate`. without_exchange.cpp takes the place of program_targets.cpp in a build
 /// without foreign formats.
-#ifndef FLEXCOMP_HOST_COMMANDS_PROGRAM_TARGETS_HPP
-#define FLEXCOMP_HOST_COMMANDS_PROGRAM_TARGETS_HPP
+#pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstddef>
@@ -40,5 +39,3 @@ class ProgramTargets {
 };
 
 }  // namespace flexcomp::host
-
-#endif

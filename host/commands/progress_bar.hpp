@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A bar on the terminal for what takes longer than a second.
-#ifndef FLEXCOMP_HOST_COMMANDS_PROGRESS_BAR_HPP
-#define FLEXCOMP_HOST_COMMANDS_PROGRESS_BAR_HPP
+#pragma once
 
 #include <chrono>
 #include <cstddef>
@@ -36,5 +35,3 @@ class ProgressBar {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Results as text for the terminal. Each kind of result has a source of its own beside this header; errors before and after,
 /// which identify, validate and diagnose show, are in accuracy.cpp.
-#ifndef FLEXCOMP_HOST_COMMANDS_RESULT_TEXT_HPP
-#define FLEXCOMP_HOST_COMMANDS_RESULT_TEXT_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -68,5 +67,3 @@ std::vector<std::string> text_lines(const PlanTask& task, const PlanResult& resu
 std::vector<std::string> comparison_lines(const PlanResult& result);
 
 }  // namespace flexcomp::host
-
-#endif

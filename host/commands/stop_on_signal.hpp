@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Ctrl-C and SIGTERM as a request to finish with what there is.
-#ifndef FLEXCOMP_HOST_COMMANDS_STOP_ON_SIGNAL_HPP
-#define FLEXCOMP_HOST_COMMANDS_STOP_ON_SIGNAL_HPP
+#pragma once
 
 #include <csignal>
 
@@ -24,5 +23,3 @@ class StopOnSignal {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Every name of the catalogue that these data may be asked about, as columns beside the model's own.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_CANDIDATES_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_CANDIDATES_HPP
+#pragma once
 
 #include <cstddef>
 #include <vector>
@@ -50,5 +49,3 @@ CandidateSet candidates(const Robot& robot, const std::vector<Observation>& rows
                         const ContextColumns& columns, const TermSet& set);
 
 }  // namespace flexcomp::host
-
-#endif

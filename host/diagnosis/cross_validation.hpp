@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Cross-validation of a solution: prediction of left-out poses in closed form (D12), and removal of what does not help.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_CROSS_VALIDATION_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_CROSS_VALIDATION_HPP
+#pragma once
 
 #include <cstddef>
 #include <vector>
@@ -31,5 +30,3 @@ Scored prune_by_cross_validation(const SubsetSearch& search, const LeftOutPoses&
                                  std::size_t most_effects, Scored best);
 
 }  // namespace flexcomp::host
-
-#endif

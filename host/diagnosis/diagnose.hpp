@@ -24,8 +24,7 @@
 /// | discriminating_poses | poses that separate confounded effects | D18 (Atkinson and Fedorov 1975) |
 ///
 /// Readers of the result: messages, effect_profile, held_out.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSE_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSE_HPP
+#pragma once
 
 #include <cstdint>
 #include <optional>
@@ -55,5 +54,3 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
                    const DiagnoseOptions& options);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A diagnosis for machines: keys in docs/diagnosis.md.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_DIAGNOSIS_JSON_HPP
+#pragma once
 
 #include <optional>
 #include <vector>
@@ -18,5 +17,3 @@ Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std
              const Robot& robot);
 
 }  // namespace flexcomp::host
-
-#endif

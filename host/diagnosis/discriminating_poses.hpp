@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Poses at which confounded effects predict different measurements.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_DISCRIMINATING_POSES_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_DISCRIMINATING_POSES_HPP
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -21,5 +20,3 @@ std::vector<SuggestedPose> discriminating_poses(const Robot& robot, const std::v
                                                 const std::vector<FoundEffect>& effects, std::uint64_t seed);
 
 }  // namespace flexcomp::host
-
-#endif

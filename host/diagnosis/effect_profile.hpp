@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// An effect as a curve, and what the rows say of it: the numbers behind its drawing.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_EFFECT_PROFILE_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_EFFECT_PROFILE_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -42,5 +41,3 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
                                         const EffectId& id, const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host
-
-#endif

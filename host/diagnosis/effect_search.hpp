@@ -3,8 +3,7 @@
 /// Search for the hypotheses that explain a misfit: blocks of the catalogue, scans and functions (D2 to D11), pruning on
 /// left-out poses (D12), rows that are outliers or structure (D13), lack of fit (D14). Search and nonlinear refit in turns,
 /// until the selected effects stay.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_EFFECT_SEARCH_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_EFFECT_SEARCH_HPP
+#pragma once
 
 #include <functional>
 #include <memory>
@@ -76,5 +75,3 @@ Selection search_and_refit(const Robot& robot, const std::vector<Observation>& r
                            const DiagnosisProgress& progress, double done);
 
 }  // namespace flexcomp::host
-
-#endif

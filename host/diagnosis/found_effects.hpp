@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Uncertainty of the selected effects: coefficients, sizes, p-values (D17), confounded effects, and errors step by step.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_FOUND_EFFECTS_HPP
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -25,5 +24,3 @@ std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vecto
 Misfit misfit_of(const FoundEffect& effect, const std::vector<PlaceShare>& places);
 
 }  // namespace flexcomp::host
-
-#endif

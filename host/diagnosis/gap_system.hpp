@@ -2,8 +2,7 @@
 /// \file
 /// Linear system of a fitted model's misfit (D1): whitened residual and candidates' columns, the model's own columns
 /// projected out.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_GAP_SYSTEM_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_GAP_SYSTEM_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -94,5 +93,3 @@ Eigen::VectorXd times(const Eigen::VectorXd& place, const Eigen::VectorXd& per_r
 const Eigen::VectorXd& place_column(const GapSystem& system, Place place);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Rows that were kept out of a diagnosis: whether the gap shrinks there too.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_HELD_OUT_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_HELD_OUT_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -35,5 +34,3 @@ void refuse_the_fitted(const MeasuredData& fitted, const MeasuredData& other);
 std::vector<std::string> missing_columns(const MeasuredData& fitted, const MeasuredData& other);
 
 }  // namespace flexcomp::host
-
-#endif

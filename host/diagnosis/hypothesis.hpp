@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Hypotheses on the cause of a misfit, and a search's selection of them.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_HYPOTHESIS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_HYPOTHESIS_HPP
+#pragma once
 
 #include <memory>
 #include <optional>
@@ -39,5 +38,3 @@ struct SearchResult {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Scans of the residual for faults that begin somewhere: a spline at a position of a joint, a step at a time.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_LOCAL_FAULTS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_LOCAL_FAULTS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -43,5 +42,3 @@ std::vector<Slip> slips(const GapSystem& system, const ResidualAnalysis& left,
                         const std::array<Eigen::VectorXd, 3>& point_columns, std::size_t most);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What a diagnosis says, in sentences and in the units of those who maintain the arm: for the terminal and for the page.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_MESSAGES_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_MESSAGES_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -48,5 +47,3 @@ std::vector<EffectId> unnamed_effects(const Diagnosis& d, const Robot& robot);
 double gap_of(double rms_m, double noise_floor_m);
 
 }  // namespace flexcomp::host
-
-#endif

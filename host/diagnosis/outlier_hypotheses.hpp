@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Outliers or structure (D13): rows that do not fit may be mistakes, or the only rows that show a local fault or a slip.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_OUTLIER_HYPOTHESES_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_OUTLIER_HYPOTHESES_HPP
+#pragma once
 
 #include <vector>
 
@@ -27,5 +26,3 @@ std::vector<std::vector<bool>> outlier_alternatives(const Robot& robot, const st
                                                     const Refit& refit, const GapSystem& everything);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Refit of the nonlinear model with the selected hypotheses: nothing is fixed (docs/model.md, M34 to M40).
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_REFIT_HPP
+#pragma once
 
 #include <vector>
 
@@ -34,5 +33,3 @@ Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, cons
                   const SearchResult& found);
 
 }  // namespace flexcomp::host
-
-#endif

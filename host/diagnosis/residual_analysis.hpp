@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Residual of a solution (D5), its projection onto the places of the chain, and their shares of the misfit (D6).
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_RESIDUAL_ANALYSIS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_RESIDUAL_ANALYSIS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -48,5 +47,3 @@ void keep_best(std::vector<Found>& all, std::size_t most) {
 }
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Answer of a diagnosis: verdict, effects with their uncertainty, places of the misfit, calibration before and after.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_RESULT_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_RESULT_HPP
+#pragma once
 
 #include <functional>
 #include <optional>
@@ -111,5 +110,3 @@ using DiagnosisProgress = std::function<void(const std::string&, double)>;
 constexpr double decisive_bic = 10;
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Blocks that scans of a residual append to a linear system while it is searched: local faults, steps of the measured
 /// point, unnamed functions.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_SCANNED_BLOCKS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_SCANNED_BLOCKS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -68,5 +67,3 @@ class ScannedBlocks {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Variance components of places (D15): places that move from pose to pose and follow nothing that was recorded, as play
 /// without its direction, joints that were read too early, a loose screw. The alternative to a lack of fit.
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_SCATTER_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_SCATTER_HPP
+#pragma once
 
 #include <vector>
 
@@ -20,5 +19,3 @@ bool prefer_scatter(Selection& selection, const Robot& robot, const std::vector<
                     const std::vector<PlaceShare>& places, const DiagnosisProgress& progress);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Unnamed functions: smooth functions of one or two covariates that turn a joint, ranked by their evidence (D9), and
 /// which of their members are relevant (D11).
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_SMOOTH_FUNCTIONS_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_SMOOTH_FUNCTIONS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -70,5 +69,3 @@ void add_smooth_table(const SmoothFunction& function, const Eigen::VectorXd& val
                       const std::vector<Variable>& variables, const Robot& robot, ParametricModel& model);
 
 }  // namespace flexcomp::host
-
-#endif

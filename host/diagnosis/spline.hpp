@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Cardinal cubic B-spline of an angle (docs/model.md, M6).
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_SPLINE_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_SPLINE_HPP
+#pragma once
 
 #include <cmath>
 
@@ -21,5 +20,3 @@ inline double cardinal_spline(double x) {
 inline double angle_difference(double a, double b) { return std::remainder(a - b, 2 * pi); }
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Selection of the blocks that explain a misfit: subsets scored by BIC and evidence (D2, D3), beam search (D4).
-#ifndef FLEXCOMP_HOST_DIAGNOSIS_SUBSET_SEARCH_HPP
-#define FLEXCOMP_HOST_DIAGNOSIS_SUBSET_SEARCH_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -109,5 +108,3 @@ class SubsetSearch {
 };
 
 }  // namespace flexcomp::host
-
-#endif

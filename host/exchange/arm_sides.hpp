@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// On which side of its singularities an arm stands: what tells apart the ways to one pose of an arm with a wrist.
-#ifndef FLEXCOMP_HOST_EXCHANGE_ARM_SIDES_HPP
-#define FLEXCOMP_HOST_EXCHANGE_ARM_SIDES_HPP
+#pragma once
 
 #include <array>
 #include <optional>
@@ -28,5 +27,3 @@ std::optional<ArmSides> arm_sides(const NominalRobot<joint_count>& robot,
 bool fits_cfx(const ArmSides& sides, int cfx);
 
 }  // namespace flexcomp::host
-
-#endif

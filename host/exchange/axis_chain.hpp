@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// From the axes of six joints in space, however a drawing states them, to the links of Eq. 1 that move the same way.
-#ifndef FLEXCOMP_HOST_EXCHANGE_AXIS_CHAIN_HPP
-#define FLEXCOMP_HOST_EXCHANGE_AXIS_CHAIN_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -73,5 +72,3 @@ AxisChain axes_of(const UrdfArm& arm);
 AxisChain axes_of(const NominalRobot<joint_count>& robot);
 
 }  // namespace flexcomp::host
-
-#endif

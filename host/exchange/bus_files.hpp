@@ -2,8 +2,7 @@
 /// \file
 /// What a controller offers on its buses as files for other programs: the electronic data sheet of the CANopen node and the
 /// Modbus register map. Both are written from the tables that the firmware serves.
-#ifndef FLEXCOMP_HOST_EXCHANGE_BUS_FILES_HPP
-#define FLEXCOMP_HOST_EXCHANGE_BUS_FILES_HPP
+#pragma once
 
 #include <cstdint>
 #include <string>
@@ -38,5 +37,3 @@ std::string register_map_markdown();
 Json register_map_json();
 
 }  // namespace flexcomp::host
-
-#endif

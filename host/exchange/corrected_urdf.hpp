@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A calibration in the words of a URDF: the same file with the origins of its joints put right.
-#ifndef FLEXCOMP_HOST_EXCHANGE_CORRECTED_URDF_HPP
-#define FLEXCOMP_HOST_EXCHANGE_CORRECTED_URDF_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -56,5 +55,3 @@ struct LeftOut {
 LeftOut left_out_by_rigid(const Calibration& calibration, const Robot& robot, std::size_t poses);
 
 }  // namespace flexcomp::host
-
-#endif

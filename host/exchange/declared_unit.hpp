@@ -2,8 +2,7 @@
 /// \file
 /// Units as other programs declare them: in the name of a column ("X [mm]", "j1_deg") or in a line before the table
 /// ("// Units: Millimeters, Degrees").
-#ifndef FLEXCOMP_HOST_EXCHANGE_DECLARED_UNIT_HPP
-#define FLEXCOMP_HOST_EXCHANGE_DECLARED_UNIT_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -66,5 +65,3 @@ struct DeclaredUnits {
 DeclaredUnits declared_units(const DelimitedText& table);
 
 }  // namespace flexcomp::host
-
-#endif

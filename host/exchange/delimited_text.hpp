@@ -2,8 +2,7 @@
 /// \file Tables as instruments and robots write them: fields separated by comma, semicolon, tab or blanks,
 /// numbers with a decimal point or comma, lines of explanation before the table, comments between. Our own
 /// files are read by csv.hpp.
-#ifndef FLEXCOMP_HOST_EXCHANGE_DELIMITED_TEXT_HPP
-#define FLEXCOMP_HOST_EXCHANGE_DELIMITED_TEXT_HPP
+#pragma once
 
 #include <cstddef>
 #include <functional>
@@ -77,5 +76,3 @@ std::optional<double> parse_number(std::string_view text, char decimal, const Un
 bool is_number(std::string_view text);
 
 }  // namespace flexcomp::host
-
-#endif

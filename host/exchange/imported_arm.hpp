@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Robots from other files than ours.
-#ifndef FLEXCOMP_HOST_EXCHANGE_IMPORTED_ARM_HPP
-#define FLEXCOMP_HOST_EXCHANGE_IMPORTED_ARM_HPP
+#pragma once
 
 #include <array>
 #include <string>
@@ -36,5 +35,3 @@ ImportedArm import_urdf(const std::string& path, const UrdfLinks& links);
 ImportedArm import_robot(const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

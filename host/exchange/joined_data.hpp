@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Points joined with a log: checked as a data file, and as JSON.
-#ifndef FLEXCOMP_HOST_EXCHANGE_JOINED_DATA_HPP
-#define FLEXCOMP_HOST_EXCHANGE_JOINED_DATA_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -30,5 +29,3 @@ std::vector<std::string> check_joined(const std::string& text, const std::string
 Json to_json(const Joining& joining, const PointList& points, const RobotLog& log, JoinBy by);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// What an instrument saw and what the robot's joints read at the time, two lists of two machines, into rows of a data
 /// file. Nothing is guessed and nothing is dropped without being named.
-#ifndef FLEXCOMP_HOST_EXCHANGE_JOINING_HPP
-#define FLEXCOMP_HOST_EXCHANGE_JOINING_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -46,5 +45,3 @@ struct Joining {
 Joining join(const PointList& points, const RobotLog& log, const JoinOptions& options);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Patterns by which the names of points tell pose and reflector: "*::{pose}_{reflector}".
-#ifndef FLEXCOMP_HOST_EXCHANGE_NAME_PATTERN_HPP
-#define FLEXCOMP_HOST_EXCHANGE_NAME_PATTERN_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -38,5 +37,3 @@ class NamePattern {
 };
 
 }  // namespace flexcomp::host
-
-#endif

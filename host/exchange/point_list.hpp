@@ -2,8 +2,7 @@
 /// \file
 /// Point lists as instruments' programs export them (SpatialAnalyzer, PolyWorks and their like): one point or frame a
 /// line, with its name, in a unit that is declared.
-#ifndef FLEXCOMP_HOST_EXCHANGE_POINT_LIST_HPP
-#define FLEXCOMP_HOST_EXCHANGE_POINT_LIST_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -60,5 +59,3 @@ const std::vector<std::string>& point_column_names();
 PointList read_point_list(const std::string& path, const PointListOptions& options);
 
 }  // namespace flexcomp::host
-
-#endif

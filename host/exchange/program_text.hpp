@@ -2,8 +2,7 @@
 /// \file
 /// What the readers of all robot languages share, and the readers: each puts what it finds into the program's targets and
 /// warnings, and throws InputError (file:line) on a target that it does not understand.
-#ifndef FLEXCOMP_HOST_EXCHANGE_PROGRAM_TEXT_HPP
-#define FLEXCOMP_HOST_EXCHANGE_PROGRAM_TEXT_HPP
+#pragma once
 
 #include <fmt/format.h>
 
@@ -109,5 +108,3 @@ class ProgramText {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The nominal robot as source text for a controller.
-#ifndef FLEXCOMP_HOST_EXCHANGE_ROBOT_HEADER_HPP
-#define FLEXCOMP_HOST_EXCHANGE_ROBOT_HEADER_HPP
+#pragma once
 
 #include <string>
 #include <string_view>
@@ -20,5 +19,3 @@ std::string c_identifier(std::string_view name);
 std::string robot_header(const Robot& robot, const std::string& made_by = "flexcomp");
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Joint readings as robots and their programs log them: any names of columns, degrees or radians, other signs and zeros.
-#ifndef FLEXCOMP_HOST_EXCHANGE_ROBOT_LOG_HPP
-#define FLEXCOMP_HOST_EXCHANGE_ROBOT_LOG_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -72,5 +71,3 @@ struct RobotLog {
 RobotLog read_robot_log(const std::string& path, const LogMap& map, const Robot& robot);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Rotations by three angles, in the conventions of instruments and robot makers.
-#ifndef FLEXCOMP_HOST_EXCHANGE_ROTATION_ANGLES_HPP
-#define FLEXCOMP_HOST_EXCHANGE_ROTATION_ANGLES_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -25,5 +24,3 @@ Eigen::Quaterniond kuka_rotation(const Eigen::Vector3d& abc_rad);
 Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& rotation);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Targets in programs of robot makers: found, as joint commands, changed in place, and every other byte left as it was.
-#ifndef FLEXCOMP_HOST_EXCHANGE_TARGET_PROGRAM_HPP
-#define FLEXCOMP_HOST_EXCHANGE_TARGET_PROGRAM_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -85,5 +84,3 @@ std::string with_commands(const TargetProgram& program, const Robot& robot, cons
                           const std::vector<std::array<double, joint_count>>& q_rad);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Places in a text and replacements there that leave every other byte as it was.
-#ifndef FLEXCOMP_HOST_EXCHANGE_TEXT_EDITS_HPP
-#define FLEXCOMP_HOST_EXCHANGE_TEXT_EDITS_HPP
+#pragma once
 
 #include <cstddef>
 #include <map>
@@ -37,5 +36,3 @@ class TextEdits {
 };
 
 }  // namespace flexcomp::host
-
-#endif

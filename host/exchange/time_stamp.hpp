@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Time stamps of instruments and robots.
-#ifndef FLEXCOMP_HOST_EXCHANGE_TIME_STAMP_HPP
-#define FLEXCOMP_HOST_EXCHANGE_TIME_STAMP_HPP
+#pragma once
 
 #include <optional>
 #include <string_view>
@@ -31,5 +30,3 @@ std::optional<TimeStamp> time_stamp(std::string_view text, const Unit& unit, cha
 const char* words(Clock clock);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Robot descriptions of ROS (URDF): the six turning joints between two links, as the file states them.
-#ifndef FLEXCOMP_HOST_EXCHANGE_URDF_FILE_HPP
-#define FLEXCOMP_HOST_EXCHANGE_URDF_FILE_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -63,5 +62,3 @@ struct UrdfLinks {
 UrdfArm load_urdf(const std::string& path, const UrdfLinks& links);
 
 }  // namespace flexcomp::host
-
-#endif

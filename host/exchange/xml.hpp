@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// XML documents as trees of elements with their places in the text, parsed by libexpat.
-#ifndef FLEXCOMP_HOST_EXCHANGE_XML_HPP
-#define FLEXCOMP_HOST_EXCHANGE_XML_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -41,5 +40,3 @@ constexpr std::size_t deepest_element = 64;
 XmlElement parse_xml(const std::string& path, const std::string& text);
 
 }  // namespace flexcomp::host
-
-#endif

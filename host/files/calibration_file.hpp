@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads and writes truth and calibration files (docs/files.md).
-#ifndef FLEXCOMP_HOST_FILES_CALIBRATION_FILE_HPP
-#define FLEXCOMP_HOST_FILES_CALIBRATION_FILE_HPP
+#pragma once
 
 #include <string>
 
@@ -25,5 +24,3 @@ std::string calibration_text(const Calibration& calibration, const Robot& robot)
 void save_calibration(const std::string& path, const Calibration& calibration, const Robot& robot);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads capsules from the fields of robot and cell files.
-#ifndef FLEXCOMP_HOST_FILES_CAPSULE_HPP
-#define FLEXCOMP_HOST_FILES_CAPSULE_HPP
+#pragma once
 
 #include "model/robot.hpp"
 
@@ -17,5 +16,3 @@ Capsule read_capsule(const YamlField& field);
 Capsule read_fixed_capsule(const YamlField& field);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads cell files (docs/files.md).
-#ifndef FLEXCOMP_HOST_FILES_CELL_FILE_HPP
-#define FLEXCOMP_HOST_FILES_CELL_FILE_HPP
+#pragma once
 
 #include <string>
 
@@ -17,5 +16,3 @@ namespace flexcomp::host {
 Cell load_cell(const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Comma-separated text (RFC 4180) with one header line. Strict: a malformed row is refused with its line.
-#ifndef FLEXCOMP_HOST_FILES_CSV_HPP
-#define FLEXCOMP_HOST_FILES_CSV_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -48,5 +47,3 @@ CsvTable read_csv(const std::string& path);
 std::string csv_cell(std::string_view text);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads and writes measured data and targets (docs/files.md).
-#ifndef FLEXCOMP_HOST_FILES_DATA_FILE_HPP
-#define FLEXCOMP_HOST_FILES_DATA_FILE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -53,5 +52,3 @@ std::vector<std::string> joint_and_context_cells(const ContextColumns& columns, 
 TargetsFile load_targets(const std::string& path, const Robot& robot, const LoadOptions& options = {});
 
 }  // namespace flexcomp::host
-
-#endif

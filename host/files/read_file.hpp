@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads a whole file.
-#ifndef FLEXCOMP_HOST_FILES_READ_FILE_HPP
-#define FLEXCOMP_HOST_FILES_READ_FILE_HPP
+#pragma once
 
 #include <string>
 
@@ -12,5 +11,3 @@ namespace flexcomp::host {
 std::string read_file(const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

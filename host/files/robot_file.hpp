@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads and writes robot files (docs/files.md).
-#ifndef FLEXCOMP_HOST_FILES_ROBOT_FILE_HPP
-#define FLEXCOMP_HOST_FILES_ROBOT_FILE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -30,5 +29,3 @@ Robot parse_robot(const std::string& text, const std::string& name);
 std::string robot_text(const Robot& robot, const std::vector<std::string>& comment);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Helpers for text readers.
-#ifndef FLEXCOMP_HOST_FILES_TEXT_HPP
-#define FLEXCOMP_HOST_FILES_TEXT_HPP
+#pragma once
 
 #include <string>
 #include <string_view>
@@ -16,5 +15,3 @@ std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Reads tolerance files: prior standard deviations of the parameters' differences from nominal (docs/files.md).
-#ifndef FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
-#define FLEXCOMP_HOST_FILES_TOLERANCE_FILE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -16,5 +15,3 @@ namespace flexcomp::host {
 std::vector<Tolerance> load_tolerances(const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Writes files atomically.
-#ifndef FLEXCOMP_HOST_FILES_WRITE_FILE_HPP
-#define FLEXCOMP_HOST_FILES_WRITE_FILE_HPP
+#pragma once
 
 #include <filesystem>
 #include <string>
@@ -22,5 +21,3 @@ std::filesystem::path written_path(const std::string& path);
 void write_file(const std::string& path, std::string_view content);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// YAML: a node with its file, line and field path for error messages; numbers and strings as text.
-#ifndef FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
-#define FLEXCOMP_HOST_FILES_YAML_FIELD_HPP
+#pragma once
 
 #include <yaml-cpp/yaml.h>
 
@@ -74,5 +73,3 @@ std::string yaml_number(double si, const Unit& unit);
 std::string yaml_quoted(const std::string& text);
 
 }  // namespace flexcomp::host
-
-#endif

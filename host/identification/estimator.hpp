@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Modified Levenberg-Marquardt on the nonlinear model (Chen et al. 2019, Section 4), whitened and robust.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_ESTIMATOR_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_ESTIMATOR_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <functional>
@@ -65,5 +64,3 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
         const Robot& robot, const EstimatorOptions& options = {});
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Converts a fit to a calibration.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_FITTED_CALIBRATION_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_FITTED_CALIBRATION_HPP
+#pragma once
 
 #include "identification/estimator.hpp"
 #include "identification/residuals.hpp"
@@ -19,5 +18,3 @@ Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Rob
 Estimate estimate_of(const Calibration& calibration);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Identifiability: rank of the identification matrix, and what each dependent column is confounded with.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFIABILITY_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -47,5 +46,3 @@ std::vector<Observation> random_observations(const Robot& robot, const std::vect
                                              std::size_t count, std::uint64_t seed);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Errors before and after and a whole identification as JSON.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFICATION_JSON_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFICATION_JSON_HPP
+#pragma once
 
 #include <vector>
 
@@ -21,5 +20,3 @@ Json to_json(const Before& before);
 Json to_json(const Identification& r, const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Identifies a calibration from measured rows: identifiable parameters, estimates, uncertainty.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_IDENTIFY_HPP
+#pragma once
 
 #include <cstdint>
 #include <optional>
@@ -102,5 +101,3 @@ struct FittedParameter {
 std::vector<FittedParameter> fitted_parameters(const Identification& r);
 
 }  // namespace flexcomp::host
-
-#endif

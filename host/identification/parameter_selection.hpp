@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Selects the identifiable parameters of measured rows and suggests poses that identify the others.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_PARAMETER_SELECTION_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_PARAMETER_SELECTION_HPP
+#pragma once
 
 #include <array>
 #include <cstdint>
@@ -52,5 +51,3 @@ Elimination possible_columns(const Robot& robot, const std::vector<Observation>&
                              const Unknowns& all, std::uint64_t seed);
 
 }  // namespace flexcomp::host
-
-#endif

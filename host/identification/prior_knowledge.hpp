@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Priors of parameters: physical bounds and tolerances.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_PRIOR_KNOWLEDGE_HPP
+#pragma once
 
 #include <limits>
 #include <vector>
@@ -26,5 +25,3 @@ std::vector<PriorKnowledge> prior_knowledge(const TermSet& set, const std::vecto
                                             bool physical, const std::vector<Tolerance>& tolerances);
 
 }  // namespace flexcomp::host
-
-#endif

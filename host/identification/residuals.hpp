@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Whitened residuals of measured poses against the model, with their exact derivatives.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_RESIDUALS_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_RESIDUALS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -91,5 +90,3 @@ Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation);
 Eigen::Matrix3d rotation_of(const Eigen::Vector3d& rotation_vector_rad);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Error statistics of rows, chi-square, median.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_STATISTICS_HPP
+#pragma once
 
 #include <optional>
 #include <vector>
@@ -37,5 +36,3 @@ bool chi_square_is_usual(double chi2, double degrees_of_freedom);
 double median(std::vector<double> values);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Validates a calibration on rows that were not fitted.
-#ifndef FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
-#define FLEXCOMP_HOST_IDENTIFICATION_VALIDATE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -40,5 +39,3 @@ std::vector<RowResidual> residuals_with(const Robot& robot, const Calibration& c
                                         const std::vector<Observation>& rows);
 
 }  // namespace flexcomp::host
-
-#endif

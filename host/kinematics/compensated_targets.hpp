@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Corrected joint commands for a list of targets, as the controller would give them.
-#ifndef FLEXCOMP_HOST_KINEMATICS_COMPENSATED_TARGETS_HPP
-#define FLEXCOMP_HOST_KINEMATICS_COMPENSATED_TARGETS_HPP
+#pragma once
 
 #include <array>
 #include <vector>
@@ -29,5 +28,3 @@ std::vector<Answer> compensated(const TargetsFile& targets,
                                 const ImageOptions& options = {});
 
 }  // namespace flexcomp::host
-
-#endif

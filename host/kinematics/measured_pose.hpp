@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Forward model of a measurement, Eq. (M1) and (M29).
-#ifndef FLEXCOMP_HOST_KINEMATICS_MEASURED_POSE_HPP
-#define FLEXCOMP_HOST_KINEMATICS_MEASURED_POSE_HPP
+#pragma once
 
 #include <array>
 
@@ -20,5 +19,3 @@ Pose<double> measured_pose(const HostModel& model, const Calibration& calibratio
                            const Context<double, joint_count>& context);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Inverse kinematics of the nominal arm.
-#ifndef FLEXCOMP_HOST_KINEMATICS_NOMINAL_INVERSE_HPP
-#define FLEXCOMP_HOST_KINEMATICS_NOMINAL_INVERSE_HPP
+#pragma once
 
 #include <array>
 #include <optional>
@@ -30,5 +29,3 @@ std::vector<std::array<double, joint_count>> nominal_inverses(const NominalRobot
 std::vector<std::array<double, joint_count>> joint_commands(const TargetsFile& targets, const Robot& robot);
 
 }  // namespace flexcomp::host
-
-#endif

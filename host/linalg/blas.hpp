@@ -3,8 +3,7 @@
 /// The few products and factors of large dense matrices that a search through a thousand columns consists of, by BLAS
 /// and LAPACK (OpenBLAS, one thread: the same numbers every time). Eigen is built without vector instructions here, for
 /// the core's sake.
-#ifndef FLEXCOMP_HOST_LINALG_BLAS_HPP
-#define FLEXCOMP_HOST_LINALG_BLAS_HPP
+#pragma once
 
 #include <Eigen/Core>
 
@@ -27,5 +26,3 @@ void solve_lower_transposed(const Eigen::MatrixXd& factor, Eigen::MatrixXd& b);
 void orthonormalise(const Eigen::MatrixXd& factor, Eigen::MatrixXd& b);
 
 }  // namespace flexcomp::host
-
-#endif

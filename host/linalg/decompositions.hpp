@@ -2,8 +2,7 @@
 /// \file
 /// Decompositions of dense matrices (Eigen's), instantiated once: in every source that uses them they would cost several
 /// seconds to compile.
-#ifndef FLEXCOMP_HOST_LINALG_DECOMPOSITIONS_HPP
-#define FLEXCOMP_HOST_LINALG_DECOMPOSITIONS_HPP
+#pragma once
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -82,5 +81,3 @@ Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& a, const Eigen::Ve
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& a);
 
 }  // namespace flexcomp::host
-
-#endif

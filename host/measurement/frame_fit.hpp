@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Pose of a tracker in the constructed base frame Fb, from points with nominal positions.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_FRAME_FIT_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <span>
@@ -33,5 +32,3 @@ FrameFit fit_frame(std::span<const Eigen::Vector3d> tracker_m, std::span<const E
                    std::span<const double> sigma_m, const std::string& source);
 
 }  // namespace flexcomp::host
-
-#endif

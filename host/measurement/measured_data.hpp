@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Measured data: joint readings, measurement and context of each row.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_MEASURED_DATA_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_MEASURED_DATA_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -65,5 +64,3 @@ struct MeasuredData {
 };
 
 }  // namespace flexcomp::host
-
-#endif

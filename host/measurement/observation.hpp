@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Observations: poses or positions with their covariance, from every kind of instrument.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_OBSERVATION_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_OBSERVATION_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -43,5 +42,3 @@ std::vector<Observation> observe(const MeasuredData& data, const Robot& robot,
                                  std::vector<std::string>* warnings = nullptr);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Rigid fit of reflector points A, B, C(, D) to a template, and estimation of the template.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_REFLECTORS_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_REFLECTORS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -69,5 +68,3 @@ Suspicion suspect_reflectors(const std::vector<Points>& rows_m, std::span<const 
 bool same_shape(const std::vector<Points>& rows_m, double sigma_m);
 
 }  // namespace flexcomp::host
-
-#endif

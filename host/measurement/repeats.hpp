@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Pure error of repeated poses (instrument and repeatability of the arm), and the lack-of-fit test against it.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_REPEATS_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_REPEATS_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -42,5 +41,3 @@ std::vector<std::vector<std::size_t>> repeats(const std::vector<Observation>& ro
 std::optional<PureError> pure_error(const std::vector<Observation>& rows, double fit_chi2, double fit_dof);
 
 }  // namespace flexcomp::host
-
-#endif

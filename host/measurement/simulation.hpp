@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Measured data from an assumed true robot: random poses and contexts, and an instrument with normal noise.
-#ifndef FLEXCOMP_HOST_MEASUREMENT_SIMULATION_HPP
-#define FLEXCOMP_HOST_MEASUREMENT_SIMULATION_HPP
+#pragma once
 
 #include <cstddef>
 #include <cstdint>
@@ -43,5 +42,3 @@ MeasuredData simulate(const Robot& robot, const Calibration& truth, const Simula
                       const std::optional<MeasuredData>& joints = {});
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Calibration: the identified terms with their covariance, the frames, and the robot they belong to.
-#ifndef FLEXCOMP_HOST_MODEL_CALIBRATION_HPP
-#define FLEXCOMP_HOST_MODEL_CALIBRATION_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -65,5 +64,3 @@ void stamp(Calibration& calibration, const Robot& robot);
 std::string hex(const Sha256Digest& digest);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Cell: where the tracker stands, the obstacles, and the clearance to keep.
-#ifndef FLEXCOMP_HOST_MODEL_CELL_HPP
-#define FLEXCOMP_HOST_MODEL_CELL_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <optional>
@@ -28,5 +27,3 @@ struct Cell {
 };
 
 }  // namespace flexcomp::host
-
-#endif

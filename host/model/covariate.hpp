@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Names and units of what errors follow: joint positions and the context of a row.
-#ifndef FLEXCOMP_HOST_MODEL_COVARIATE_HPP
-#define FLEXCOMP_HOST_MODEL_COVARIATE_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -28,5 +27,3 @@ std::string factor_name(Factor factor);
 std::optional<Factor> factor_of(std::string_view name);
 
 }  // namespace flexcomp::host
-
-#endif

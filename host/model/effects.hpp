@@ -2,8 +2,7 @@
 /// \file
 /// Effects by name, their parameters in a set of terms, and a set of terms read back into effects. What an effect is
 /// stands in its descriptor (model/effects/descriptor.hpp).
-#ifndef FLEXCOMP_HOST_MODEL_EFFECTS_HPP
-#define FLEXCOMP_HOST_MODEL_EFFECTS_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -61,5 +60,3 @@ TermSet canonical(const TermSet& set, const Nominal& robot);
 std::vector<Parameter> parameters_of(const TermSet& set, const Nominal& robot);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Frames of the measurement: F (robot base in the instrument) and E (measured point in the tool), Eq. (M1) of docs/model.md.
-#ifndef FLEXCOMP_HOST_MODEL_FRAMES_HPP
-#define FLEXCOMP_HOST_MODEL_FRAMES_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -31,5 +30,3 @@ struct MeasurementFrames {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The core's model with room for everything that a calibration on the host may hold.
-#ifndef FLEXCOMP_HOST_MODEL_HOST_MODEL_HPP
-#define FLEXCOMP_HOST_MODEL_HOST_MODEL_HPP
+#pragma once
 
 #include <memory>
 #include <string>
@@ -21,5 +20,3 @@ using HostModel = Model<double, joint_count, HostCapacity>;
 std::unique_ptr<HostModel> prepare(const TermSet& set, const Robot& robot, const std::string& source);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The parameters of the paper's model on any arm (docs/model.md, M4).
-#ifndef FLEXCOMP_HOST_MODEL_PAPER_MODEL_HPP
-#define FLEXCOMP_HOST_MODEL_PAPER_MODEL_HPP
+#pragma once
 
 #include <array>
 
@@ -32,5 +31,3 @@ enum class ModelKind { full, geometric, no_gravity, no_stiffness };
 ParametricModel paper_model(const Nominal& robot, ModelKind kind, bool with_base);
 
 }  // namespace flexcomp::host
-
-#endif

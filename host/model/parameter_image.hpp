@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A calibration as the bytes that a controller takes, and back.
-#ifndef FLEXCOMP_HOST_MODEL_PARAMETER_IMAGE_HPP
-#define FLEXCOMP_HOST_MODEL_PARAMETER_IMAGE_HPP
+#pragma once
 
 #include <cstdint>
 #include <span>
@@ -35,5 +34,3 @@ Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const Ro
                                    const std::string& source);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Names and units of the places where terms act.
-#ifndef FLEXCOMP_HOST_MODEL_PLACE_HPP
-#define FLEXCOMP_HOST_MODEL_PLACE_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -32,5 +31,3 @@ constexpr const char* small_terms_rule = "at most 20 mm and 2 deg (larger displa
 bool is_beyond_small(const Term<double>& term);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Robot: nominal geometry, limits, tool, payload, instrument noise and bodies of one arm.
-#ifndef FLEXCOMP_HOST_MODEL_ROBOT_HPP
-#define FLEXCOMP_HOST_MODEL_ROBOT_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -38,5 +37,3 @@ struct Robot {
 };
 
 }  // namespace flexcomp::host
-
-#endif

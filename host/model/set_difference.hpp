@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What would change at the arm if one set of parameters took the place of another: by name, and at the tool.
-#ifndef FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_HPP
-#define FLEXCOMP_HOST_MODEL_SET_DIFFERENCE_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -63,5 +62,3 @@ SetDifference difference(const TermSet& before, const TermSet& after, const Robo
 Json to_json(const SetDifference& d);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Targets of compensation.
-#ifndef FLEXCOMP_HOST_MODEL_TARGETS_HPP
-#define FLEXCOMP_HOST_MODEL_TARGETS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -38,5 +37,3 @@ struct TargetsFile {
 };
 
 }  // namespace flexcomp::host
-
-#endif

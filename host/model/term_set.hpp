@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A list of terms that owns its memory, and the named parameters that drive it.
-#ifndef FLEXCOMP_HOST_MODEL_TERM_SET_HPP
-#define FLEXCOMP_HOST_MODEL_TERM_SET_HPP
+#pragma once
 
 #include <cstddef>
 #include <optional>
@@ -54,5 +53,3 @@ struct ParametricModel {
 };
 
 }  // namespace flexcomp::host
-
-#endif

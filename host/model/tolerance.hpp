@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Prior standard deviations of the parameters' differences from nominal.
-#ifndef FLEXCOMP_HOST_MODEL_TOLERANCE_HPP
-#define FLEXCOMP_HOST_MODEL_TOLERANCE_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -28,5 +27,3 @@ std::vector<std::size_t> parameters_meant(const Tolerance& tolerance,
                                           const std::vector<Parameter>& parameters);
 
 }  // namespace flexcomp::host
-
-#endif

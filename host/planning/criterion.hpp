@@ -7,8 +7,7 @@
 ///   Omin, expected = tr(M⁻¹)                (mean over the noise of the squared errors in units; Eq. 30 needs the truth)
 ///   fitness = Omin, expected / O1           (Eq. 33; smaller is better)
 /// Equations (M43) to (M46). Where the frames are fitted too, M is its Schur complement without them, (M45).
-#ifndef FLEXCOMP_HOST_PLANNING_CRITERION_HPP
-#define FLEXCOMP_HOST_PLANNING_CRITERION_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -94,5 +93,3 @@ struct ExactFigures {
 ExactFigures exact_figures(const std::vector<Block>& blocks, Eigen::Index nuisance);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file DETMAX (Mitchell 1974): D-optimal sets by excursions, which grow and shrink the set by several poses
 /// and return to its size. The baseline of Chen's Fig. 8.
-#ifndef FLEXCOMP_HOST_PLANNING_DETMAX_HPP
-#define FLEXCOMP_HOST_PLANNING_DETMAX_HPP
+#pragma once
 
 #include <cstdint>
 
@@ -44,5 +43,3 @@ class DetmaxSearch : public Search {
 };
 
 }  // namespace flexcomp::host
-
-#endif

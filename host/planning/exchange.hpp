@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file Exchange algorithm (Fedorov; Cook and Nachtsheim): each pose of the set in turn is replaced by the
 /// best candidate, until a full pass changes nothing.
-#ifndef FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
-#define FLEXCOMP_HOST_PLANNING_EXCHANGE_HPP
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -65,5 +64,3 @@ class ExchangeSearch : public Search {
 };
 
 }  // namespace flexcomp::host
-
-#endif

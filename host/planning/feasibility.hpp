@@ -2,8 +2,7 @@
 /// \file
 /// Feasibility of a measurement pose: joint limits, collisions, and the laser tracker's beam (Chen et al. 2019, Section
 /// 3.2, Eq. 26-29), by exact distances.
-#ifndef FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
-#define FLEXCOMP_HOST_PLANNING_FEASIBILITY_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -136,5 +135,3 @@ std::vector<std::array<double, joint_count>> feasible_poses(const Feasibility& f
                                                             std::uint64_t seed);
 
 }  // namespace flexcomp::host
-
-#endif

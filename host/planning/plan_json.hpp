@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A plan as JSON.
-#ifndef FLEXCOMP_HOST_PLANNING_PLAN_JSON_HPP
-#define FLEXCOMP_HOST_PLANNING_PLAN_JSON_HPP
+#pragma once
 
 #include "json.hpp"
 #include "planning/plan_result.hpp"
@@ -13,5 +12,3 @@ namespace flexcomp::host {
 Json to_json(const PlanTask& task, const PlanResult& result, const std::string& output);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A finished plan: poses in the order of travel, what they will make known, and other methods for comparison.
-#ifndef FLEXCOMP_HOST_PLANNING_PLAN_RESULT_HPP
-#define FLEXCOMP_HOST_PLANNING_PLAN_RESULT_HPP
+#pragma once
 
 #include <cstdint>
 #include <functional>
@@ -78,5 +77,3 @@ PlanResult find_plan(const PlanTask& task, const StateFiles& files, const StopSe
 MeasuredData plan_rows(const PlanTask& task, const PlanResult& result);
 
 }  // namespace flexcomp::host
-
-#endif

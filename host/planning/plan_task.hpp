@@ -2,8 +2,7 @@
 /// \file
 /// What measurement poses are planned for: robot, cell, instrument, what is measured already, candidates and payloads,
 /// as the problem that a search solves.
-#ifndef FLEXCOMP_HOST_PLANNING_PLAN_TASK_HPP
-#define FLEXCOMP_HOST_PLANNING_PLAN_TASK_HPP
+#pragma once
 
 #include <cstdint>
 #include <map>
@@ -71,5 +70,3 @@ class PlanTask {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Plans measurement poses: methods by name, least number of poses, random reference sets, rounding, order of travel.
-#ifndef FLEXCOMP_HOST_PLANNING_PLANNER_HPP
-#define FLEXCOMP_HOST_PLANNING_PLANNER_HPP
+#pragma once
 
 #include <array>
 #include <cstdint>
@@ -54,5 +53,3 @@ PoseSet in_order_of_travel(const PlanProblem& problem, const PoseSet& set,
 double path_length(const PoseSet& set, const std::array<double, joint_count>& speed_rad_s);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Rows of the whitened, scaled identification matrix H (Chen et al. 2019, Eq. 23) that one measured pose contributes;
 /// about 2 microseconds a pose.
-#ifndef FLEXCOMP_HOST_PLANNING_POSE_INFORMATION_HPP
-#define FLEXCOMP_HOST_PLANNING_POSE_INFORMATION_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -99,5 +98,3 @@ class PoseInformation {
 };
 
 }  // namespace flexcomp::host
-
-#endif

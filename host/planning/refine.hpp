@@ -2,8 +2,7 @@
 /// \file
 /// The default method: exchange over a few hundred random poses, then projected L-BFGS over all joint positions, then
 /// iterated local search that replaces one pose and refines again.
-#ifndef FLEXCOMP_HOST_PLANNING_REFINE_HPP
-#define FLEXCOMP_HOST_PLANNING_REFINE_HPP
+#pragma once
 
 #include <cstdint>
 
@@ -46,5 +45,3 @@ class RefineSearch : public Search {
 };
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Particle swarm with self-adaptive inertia (Chen et al. 2019, Eq. 33-35): every particle is a whole set of poses.
-#ifndef FLEXCOMP_HOST_PLANNING_SAPSO_HPP
-#define FLEXCOMP_HOST_PLANNING_SAPSO_HPP
+#pragma once
 
 #include <cstdint>
 #include <functional>
@@ -63,5 +62,3 @@ class SapsoSearch : public Search {
 };
 
 }  // namespace flexcomp::host
-
-#endif

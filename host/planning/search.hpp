@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file The planning problem, and the interface of all search methods: steps with progress, state that is
 /// saved and restored.
-#ifndef FLEXCOMP_HOST_PLANNING_SEARCH_HPP
-#define FLEXCOMP_HOST_PLANNING_SEARCH_HPP
+#pragma once
 
 #include <cstddef>
 #include <cstdint>
@@ -107,5 +106,3 @@ Json to_json(const PoseSet& set);
 PoseSet pose_set_of(const Json& json, const PlanProblem& problem);
 
 }  // namespace flexcomp::host
-
-#endif

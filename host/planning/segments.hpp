@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Exact distances between segments.
-#ifndef FLEXCOMP_HOST_PLANNING_SEGMENTS_HPP
-#define FLEXCOMP_HOST_PLANNING_SEGMENTS_HPP
+#pragma once
 
 #include <Eigen/Core>
 
@@ -21,5 +20,3 @@ double squared_distance(const Eigen::Vector3d& point, const Segment& segment);
 double squared_distance(const Segment& a, const Segment& b);
 
 }  // namespace flexcomp::host
-
-#endif

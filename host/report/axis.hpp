@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Axes of plots: linear and logarithmic scales, round limits, and ticks whose texts do not overlap.
-#ifndef FLEXCOMP_HOST_REPORT_AXIS_HPP
-#define FLEXCOMP_HOST_REPORT_AXIS_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -59,5 +58,3 @@ std::size_t bin_count(std::size_t n);
 std::vector<std::size_t> histogram(const std::vector<double>& values, const Scale& scale, std::size_t bins);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// HTML in parts: escaped text, tables, figures. All take plain text and escape it, unless they say otherwise.
-#ifndef FLEXCOMP_HOST_REPORT_HTML_HPP
-#define FLEXCOMP_HOST_REPORT_HTML_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -38,5 +37,3 @@ std::string table(const Cells& columns, const std::vector<Cells>& rows, const st
                   const std::vector<bool>& pale = {});
 
 }  // namespace flexcomp::host
-
-#endif

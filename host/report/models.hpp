@@ -2,8 +2,7 @@
 /// \file
 /// The paper's comparison of models (Chen et al. 2019, Fig. 3 and Fig. 10): each fitted to the same rows, and judged on rows
 /// that it was not fitted to.
-#ifndef FLEXCOMP_HOST_REPORT_MODELS_HPP
-#define FLEXCOMP_HOST_REPORT_MODELS_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -37,5 +36,3 @@ std::vector<ModelFit> compare_models(const Robot& robot, const std::vector<Obser
 std::string model_words(ModelKind kind);
 
 }  // namespace flexcomp::host
-
-#endif

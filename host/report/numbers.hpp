@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Numbers as a page shows them.
-#ifndef FLEXCOMP_HOST_REPORT_NUMBERS_HPP
-#define FLEXCOMP_HOST_REPORT_NUMBERS_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -26,5 +25,3 @@ std::string unit_of_name(std::string_view name);
 std::pair<std::string, std::string> with_uncertainty(double value, const std::optional<double>& sigma);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -4,8 +4,7 @@
 /// (inline SVG) are made here and can be read without scripts; the script that the page carries (report/web) adds the arm
 /// in 3-D and plots to choose from. Whoever has numbers fills a Page; whatever is left empty leaves no trace on the page.
 /// All text is escaped.
-#ifndef FLEXCOMP_HOST_REPORT_PAGE_HPP
-#define FLEXCOMP_HOST_REPORT_PAGE_HPP
+#pragma once
 
 #include <array>
 #include <optional>
@@ -135,5 +134,3 @@ bool has_web_parts();
 std::string html(const Page& page, bool web = has_web_parts());
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The frame of a plot in SVG: axes with ticks, legend, and the marks that are drawn into it.
-#ifndef FLEXCOMP_HOST_REPORT_PLOT_FRAME_HPP
-#define FLEXCOMP_HOST_REPORT_PLOT_FRAME_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -59,5 +58,3 @@ std::string dots_of(std::size_t count, const std::string& kind);
 std::string fine_dots(std::vector<std::array<double, 2>> places);
 
 }  // namespace flexcomp::host
-
-#endif

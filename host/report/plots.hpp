@@ -2,8 +2,7 @@
 /// \file
 /// The plots of a page as inline SVG. Colours come from the page's style sheet by class, so that one drawing serves
 /// light, dark and paper. Of very many poses a part is drawn (shown_poses()), so that a page stays small. Drawn for the width of a phone; wider screens put several beside each other.
-#ifndef FLEXCOMP_HOST_REPORT_PLOTS_HPP
-#define FLEXCOMP_HOST_REPORT_PLOTS_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -99,5 +98,3 @@ std::string plot_bars(const Bars& bars);
 std::string plot_coverage(const PagePlan& plan);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// Errors of a set of poses as the lists of numbers that plots, tables and the script of a page take, and which of very
 /// many poses are drawn.
-#ifndef FLEXCOMP_HOST_REPORT_POSE_ERRORS_HPP
-#define FLEXCOMP_HOST_REPORT_POSE_ERRORS_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -46,5 +45,3 @@ std::vector<std::size_t> shown_rows(const std::vector<const std::vector<double>*
 std::vector<std::size_t> evenly_spaced(std::size_t count, std::size_t most);
 
 }  // namespace flexcomp::host
-
-#endif

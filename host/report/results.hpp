@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Pages of what `identify`, `validate`, `diagnose` and `plan` found.
-#ifndef FLEXCOMP_HOST_REPORT_RESULTS_HPP
-#define FLEXCOMP_HOST_REPORT_RESULTS_HPP
+#pragma once
 
 #include <optional>
 #include <string>
@@ -40,5 +39,3 @@ PagePoses page_poses(const std::vector<RowResidual>& before, const std::vector<R
                      bool frames_fitted);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The sections of a page as HTML. Each is empty where the page has nothing to say in it.
-#ifndef FLEXCOMP_HOST_REPORT_SECTIONS_HPP
-#define FLEXCOMP_HOST_REPORT_SECTIONS_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -31,5 +30,3 @@ std::string parameters_section(const Page& page);
 std::string links_list(const Page& page);
 
 }  // namespace flexcomp::host
-
-#endif

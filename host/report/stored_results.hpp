@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Parts of a page from files of earlier runs.
-#ifndef FLEXCOMP_HOST_REPORT_STORED_RESULTS_HPP
-#define FLEXCOMP_HOST_REPORT_STORED_RESULTS_HPP
+#pragma once
 
 #include <string>
 
@@ -19,5 +18,3 @@ PagePoses errors_before_and_after(const std::string& title, const std::string& b
 PageResult stored_result(const std::string& title, const std::string& path);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The style sheet of a page: light, dark, phone and paper.
-#ifndef FLEXCOMP_HOST_REPORT_STYLE_HPP
-#define FLEXCOMP_HOST_REPORT_STYLE_HPP
+#pragma once
 
 namespace flexcomp::host {
 
@@ -83,5 +82,3 @@ footer { color: var(--soft); font-size: .85rem; margin: 2.5rem 0 1rem; border-to
 )css";
 
 }  // namespace flexcomp::host
-
-#endif

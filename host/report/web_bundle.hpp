@@ -2,8 +2,7 @@
 /// \file
 /// The script and style sheet of the page's interactive parts. Made by the build from report/web and the npm packages that
 /// its lock file names; empty where the program was configured with FLEXCOMP_REPORT_WEB=OFF.
-#ifndef FLEXCOMP_HOST_REPORT_WEB_BUNDLE_HPP
-#define FLEXCOMP_HOST_REPORT_WEB_BUNDLE_HPP
+#pragma once
 
 #include <string_view>
 
@@ -15,5 +14,3 @@ std::string_view web_script();
 std::string_view web_style();
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The numbers of a page for its script.
-#ifndef FLEXCOMP_HOST_REPORT_WEB_DATA_HPP
-#define FLEXCOMP_HOST_REPORT_WEB_DATA_HPP
+#pragma once
 
 #include <cstddef>
 #include <string>
@@ -16,5 +15,3 @@ namespace flexcomp::host {
 std::string web_data(const Page& page, std::size_t most);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Repeated calibrations of a simulated arm with random noise, their scores and Cramér-Rao limits.
-#ifndef FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
-#define FLEXCOMP_HOST_STUDIES_CALIBRATIONS_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -110,5 +109,3 @@ struct Score {
 Score repeated_score(const Experiment& experiment, std::size_t repeats, std::uint64_t seed);
 
 }  // namespace flexcomp::host
-
-#endif

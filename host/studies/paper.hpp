@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The arms of the paper's studies with their assumed true errors (Chen et al. 2019, Table 1; docs/model.md, section 12).
-#ifndef FLEXCOMP_HOST_STUDIES_PAPER_HPP
-#define FLEXCOMP_HOST_STUDIES_PAPER_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -55,5 +54,3 @@ enum class ErrorKind { joint_angles, link_lengths };
 TermSet part_of_table1(const StudiedArm& arm, ErrorKind kind, double factor);
 
 }  // namespace flexcomp::host
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Measurement poses of a study by each planning method, in one cell.
-#ifndef FLEXCOMP_HOST_STUDIES_PLANNED_HPP
-#define FLEXCOMP_HOST_STUDIES_PLANNED_HPP
+#pragma once
 
 #include <cstddef>
 #include <cstdint>
@@ -35,5 +34,3 @@ Eigen::VectorXd errors_at_the_chosen_draw(const StudiedArm& arm, const std::vect
                                           std::uint64_t seed, const std::vector<Parameter>& parameters);
 
 }  // namespace flexcomp::host
-
-#endif

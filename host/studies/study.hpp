@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The studies of Chen et al. 2019: printed figure, our figure, and the Cramér-Rao limit.
-#ifndef FLEXCOMP_HOST_STUDIES_STUDY_HPP
-#define FLEXCOMP_HOST_STUDIES_STUDY_HPP
+#pragma once
 
 #include <cstdint>
 #include <functional>
@@ -72,5 +71,3 @@ struct StudyEntry {
 const std::vector<StudyEntry>& studies();
 
 }  // namespace flexcomp::host
-
-#endif

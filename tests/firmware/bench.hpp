@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the firmware's tests share: an arm, images for it, and a flash memory whose power can be cut at any
 // byte.
-#ifndef FLEXCOMP_TESTS_FIRMWARE_BENCH_HPP
-#define FLEXCOMP_TESTS_FIRMWARE_BENCH_HPP
+#pragma once
 
 #include <array>
 #include <cmath>
@@ -237,5 +236,3 @@ inline Compensated<Scalar, joints> by_the_core(const Robot& robot, const Bytes& 
 }
 
 }  // namespace flexcomp::firmware::bench
-
-#endif

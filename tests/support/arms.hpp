@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the tests calibrate: three arms, the paper's Table 1, random poses. SI units: m, rad, kg, N, K, s.
-#ifndef FLEXCOMP_TESTS_SUPPORT_ARMS_HPP
-#define FLEXCOMP_TESTS_SUPPORT_ARMS_HPP
+#pragma once
 
 #include <algorithm>
 #include <array>
@@ -384,5 +383,3 @@ inline double angle_between(const A& a, const B& b) {
 }
 
 }  // namespace arms
-
-#endif

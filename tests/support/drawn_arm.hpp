@@ -2,8 +2,7 @@
 /// \file
 /// Arms as drawings state them: joint origins and axes. Written as URDF for the program, and as a chain of KDL, which
 /// shares no code with it, for the judge.
-#ifndef FLEXCOMP_TESTS_SUPPORT_DRAWN_ARM_HPP
-#define FLEXCOMP_TESTS_SUPPORT_DRAWN_ARM_HPP
+#pragma once
 
 #include <array>
 #include <cmath>
@@ -158,5 +157,3 @@ inline Arm rx160l() {
 }
 
 }  // namespace drawn
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// True arms with hidden effects, measured: what the diagnosis is judged by. The arm moves by plain_arm.hpp, without a
 /// line of the core; the catalogue gives nothing but names. SI units.
-#ifndef FLEXCOMP_TESTS_SUPPORT_HIDDEN_ARM_HPP
-#define FLEXCOMP_TESTS_SUPPORT_HIDDEN_ARM_HPP
+#pragma once
 
 #include <array>
 #include <cstddef>
@@ -113,5 +112,3 @@ void append_hidden(flexcomp::host::ParametricModel& model, const Case& c, bool w
 void dump(const Case& c, const std::string& folder);
 
 }  // namespace hidden
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Real arms, measured by others (../shared/data, or the folder that FLEXCOMP_DATA names).
-#ifndef FLEXCOMP_TESTS_SUPPORT_MEASURED_ARM_HPP
-#define FLEXCOMP_TESTS_SUPPORT_MEASURED_ARM_HPP
+#pragma once
 
 #include <algorithm>
 #include <cstdlib>
@@ -50,5 +49,3 @@ struct Thirds {
 };
 
 }  // namespace flexcomp::host
-
-#endif

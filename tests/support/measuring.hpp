@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Simulated measurements of an assumed true TX60L, as the tests of the identification want them.
-#ifndef FLEXCOMP_TESTS_SUPPORT_MEASURING_HPP
-#define FLEXCOMP_TESTS_SUPPORT_MEASURING_HPP
+#pragma once
 
 #include <cstdint>
 #include <map>
@@ -101,5 +100,3 @@ inline std::map<std::string, double> lumped_truth(const Robot& robot) {
 }
 
 }  // namespace measuring
-
-#endif

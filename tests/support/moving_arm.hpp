@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Where an arm goes, by the forward kinematics that the whole host uses.
-#ifndef FLEXCOMP_TESTS_SUPPORT_MOVING_ARM_HPP
-#define FLEXCOMP_TESTS_SUPPORT_MOVING_ARM_HPP
+#pragma once
 
 #include <array>
 #include <memory>
@@ -31,5 +30,3 @@ class MovingArm {
 };
 
 }  // namespace support
-
-#endif

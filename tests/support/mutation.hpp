@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Good texts made bad at random: a reader takes them or refuses them, and nothing else happens.
-#ifndef FLEXCOMP_TESTS_SUPPORT_MUTATION_HPP
-#define FLEXCOMP_TESTS_SUPPORT_MUTATION_HPP
+#pragma once
 
 #include <gtest/gtest.h>
 
@@ -65,5 +64,3 @@ int refused_mutations(const std::string& good, const Mutations& how, const Read&
 }
 
 }  // namespace support
-
-#endif

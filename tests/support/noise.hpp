@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Normally distributed noise, and what it makes of a pose.
-#ifndef FLEXCOMP_TESTS_SUPPORT_NOISE_HPP
-#define FLEXCOMP_TESTS_SUPPORT_NOISE_HPP
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -40,5 +39,3 @@ inline Vector6d error_of(const flexcomp::Pose<double>& found, const flexcomp::Po
 }
 
 }  // namespace support
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// The flexible arm of docs/model.md and docs/effects.md as 4x4 matrices, one after the other: slow, obvious, and without a
 /// line of the core. SI units: m, rad, kg, N, N·m, K, s. Joints and links are counted from 1, as in the files.
-#ifndef FLEXCOMP_TESTS_SUPPORT_PLAIN_ARM_HPP
-#define FLEXCOMP_TESTS_SUPPORT_PLAIN_ARM_HPP
+#pragma once
 
 #include <Eigen/Dense>
 
@@ -340,5 +339,3 @@ inline Result forward(const Nominal& n, const Truth& t, const Joints& q, const S
 }
 
 }  // namespace plain
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the core is given, as plain_arm.hpp wants it.
-#ifndef FLEXCOMP_TESTS_SUPPORT_PLAIN_CASE_HPP
-#define FLEXCOMP_TESTS_SUPPORT_PLAIN_CASE_HPP
+#pragma once
 
 #include "support/arms.hpp"
 
@@ -35,5 +34,3 @@ inline Situation situation_of(const flexcomp::Context<double>& c) {
 inline std::array<double, 6> six(const Small& v) { return {v.x, v.y, v.z, v.rx, v.ry, v.rz}; }
 
 }  // namespace plain
-
-#endif

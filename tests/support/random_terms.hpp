@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Terms at every place with every basis, at sizes that occur in factories.
-#ifndef FLEXCOMP_TESTS_SUPPORT_RANDOM_TERMS_HPP
-#define FLEXCOMP_TESTS_SUPPORT_RANDOM_TERMS_HPP
+#pragma once
 
 #include <vector>
 
@@ -161,5 +160,3 @@ inline TermSet<double> everything(const Arm& arm, Random& random, std::size_t ef
 }
 
 }  // namespace arms
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The robot files of the project.
-#ifndef FLEXCOMP_TESTS_SUPPORT_ROBOT_FILES_HPP
-#define FLEXCOMP_TESTS_SUPPORT_ROBOT_FILES_HPP
+#pragma once
 
 #include <string>
 
@@ -24,5 +23,3 @@ inline const flexcomp::host::Robot& tx60l() {
 }
 
 }  // namespace support
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files that a test makes, and input that must be refused.
-#ifndef FLEXCOMP_TESTS_SUPPORT_TEXT_FILE_HPP
-#define FLEXCOMP_TESTS_SUPPORT_TEXT_FILE_HPP
+#pragma once
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -74,5 +73,3 @@ void expect_refused(const Action& action, std::size_t line, const std::string& f
 }
 
 }  // namespace support
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What an action throws, for a test to look at.
-#ifndef FLEXCOMP_TESTS_SUPPORT_THROWN_HPP
-#define FLEXCOMP_TESTS_SUPPORT_THROWN_HPP
+#pragma once
 
 #include <stdexcept>
 
@@ -20,5 +19,3 @@ Error thrown(const Action& action) {
 }
 
 }  // namespace support
-
-#endif

@@ -89,9 +89,29 @@ Error grid_error(const EffectId& id) {
   return {};
 }
 
-Follows own_reading(const EffectId& id) { return {Covariate::joint_position, {id.joint}}; }
-Follows the_load(const EffectId&) { return {Covariate::payload, {}}; }
-Follows the_time(const EffectId&) { return {Covariate::time, {}}; }
+template <std::uint8_t of_body, std::uint8_t of_slot>
+Place always(const EffectId&) {
+  return {of_body, of_slot};
+}
+
+template <Covariate of_the_arm>
+Follows the(const EffectId&) {
+  return {of_the_arm, {}};
+}
+template <Covariate of_a_joint>
+Follows own(const EffectId& id) {
+  return {of_a_joint, {id.joint}};
+}
+
+/// Three keys that move the measured point by `basis`.
+Keys moving_the_point(const EffectId& id, Basis basis, const char* suffix, const Unit& unit) {
+  Keys keys;
+  for (std::uint8_t s = slot::x; s <= slot::z; ++s) {
+    const Place place{body::point, s};
+    keys.push_back(key(slot_name(place) + suffix, term(id, place, basis, 0, id.after_s), unit));
+  }
+  return keys;
+}
 
 std::string joint_name(const EffectId& id) { return fmt::format("joint {}", id.joint); }
 
@@ -118,12 +138,11 @@ std::vector<EffectDescriptor> make_effects() {
       .elimination_rank = [](Place p) { return p.body == 1 ? 12 : 3; },
       .needs = Needs::load,
       .place = theta,
-      .follows = the_load,
+      .follows = the<Covariate::payload>,
       .sentence = [](const EffectId& id) { return joint_name(id) + " deflects under the load"; },
       .physics = "The joint is a linear torsional spring: it turns in proportion to the torque of payload "
-                 "and external "
-                 "force about its axis (M11, M12). The coefficient is a compliance, 1/K. Usual: 1e-8 to 2e-3 "
-                 "rad/(N·m).",
+                 "and external force about its axis (M11, M12). The coefficient is a compliance, 1/K. Usual: "
+                 "1e-8 to 2e-3 rad/(N·m).",
       .record = "two payloads, one of them small",
       .confounded_with = "`payload_error` (a scale of all loads), unless one load is trusted",
       .example = {.effect = Effect::joint_compliance, .joint = 2},
@@ -138,14 +157,13 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place) { return 1e-6; },
       .needs = Needs::load,
       .place = theta,
-      .follows = the_load,
+      .follows = the<Covariate::payload>,
       .sentence =
           [](const EffectId& id) {
             return joint_name(id) + " deflects under the load otherwise than in proportion";
           },
       .physics = "Gears stiffen with torque: a cubic part of the joint's deflection beside the linear one "
-                 "(M11). Negative "
-                 "where the joint stiffens. Usual: 0.3 to 1 arcmin at rated torque.",
+                 "(M11). Negative where the joint stiffens. Usual: 0.3 to 1 arcmin at rated torque.",
       .record = "three payloads over the rated range",
       .confounded_with = "`joint_compliance` of the same joint, where all torques are of one size",
       .example = {.effect = Effect::nonlinear_compliance, .joint = 3},
@@ -167,15 +185,13 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place) { return 1e-6; },
       .needs = Needs::load,
       .place = [](const EffectId& id) { return link_place(id.link, slot::alpha); },
-      .follows = the_load,
+      .follows = the<Covariate::payload>,
       .sentence =
           [](const EffectId& id) { return fmt::format("link {} bends sideways under the load", id.link); },
       .physics = "The link, and the bearing at its end, tilt under the moment of the load about x and y of "
-                 "the frame "
-                 "after the link (M10). The tilt about y is identified only where the link's twist is small "
-                 "(\\|sin α\\| ≤ 0.1): elsewhere it is the joint's own motion. Of link 6 it is the bending "
-                 "of the tool "
-                 "flange.",
+                 "the frame after the link (M10). The tilt about y is identified only where the link's twist "
+                 "is small (\\|sin α\\| ≤ 0.1): elsewhere it is the joint's own motion. Of link 6 it is the "
+                 "bending of the tool flange.",
       .record = "two payloads, the load far from the flange, the wrist turned",
       .confounded_with = "`joint_compliance` of neighbouring joints, `base_compliance` for link 1",
       .example = {.effect = Effect::link_bending, .link = 3},
@@ -192,21 +208,16 @@ std::vector<EffectDescriptor> make_effects() {
       },
       .usual_size = [](Place) { return 1e-7; },
       .needs = Needs::load,
-      .place =
-          [](const EffectId&) {
-            return Place{body::base, slot::rx};
-          },
-      .follows = the_load,
+      .place = always<body::base, slot::rx>,
+      .follows = the<Covariate::payload>,
       .sentence =
           [](const EffectId& id) {
             return fmt::format("the base tilts under the load, about a pivot at z = {:.0f} mm",
                                id.pivot_z_m * 1e3);
           },
       .physics = "Pedestal or rail: the base tilts under the moment of payload and external force about x "
-                 "and y of F0 "
-                 "through the pivot (0, 0, `pivot_z_mm`) (M10). The search takes the lowest point of the "
-                 "bodies that "
-                 "stand on the base for the pivot.",
+                 "and y of F0 through the pivot (0, 0, `pivot_z_mm`) (M10). The search takes the lowest "
+                 "point of the bodies that stand on the base for the pivot.",
       .record = "two payloads, the arm stretched out in several directions",
       .confounded_with = "`joint_compliance` of joint 2 where the pivot is near that joint's height",
       .example = {.effect = Effect::base_compliance, .pivot_z_m = -0.375},
@@ -228,15 +239,11 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place p) { return p.slot == slot::mass ? 0.1 : 0.01; },
       .needs = Needs::load,
       .forms = {{0}, {1, 2, 3}, {0, 1, 2, 3}},
-      .place =
-          [](const EffectId&) {
-            return Place{body::load, slot::mass};
-          },
-      .follows = the_load,
+      .place = always<body::load, slot::mass>,
+      .follows = the<Covariate::payload>,
       .sentence = [](const EffectId&) { return std::string("the payload is not what was declared"); },
       .physics = "Mass and centre of mass of the payload are corrected by the same amounts in every row, "
-                 "before torques "
-                 "are taken (section 3). 10 % of the mass is 10 % of the sag.",
+                 "before torques are taken (section 3). 10 % of the mass is 10 % of the sag.",
       .record = "two payloads of which one is trusted (none at all, say)",
       .confounded_with =
           "`joint_compliance`: a scale error of all loads is exactly a scale of all compliances",
@@ -259,7 +266,7 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place) { return 1e-3; },
       .in_paper_model = true,
       .elimination_rank = [](Place) { return 3; },
-      .place = [](const EffectId&) { return link_place(2, slot::theta); },
+      .place = always<2, slot::theta>,
       .follows =
           [](const EffectId&) {
             return Follows{Covariate::joint_position, {2, 3}};
@@ -267,10 +274,8 @@ std::vector<EffectDescriptor> make_effects() {
       .sentence =
           [](const EffectId&) { return std::string("upper arm and forearm sag under their own weight"); },
       .physics = "Upper arm and forearm load joints 2 and 3 with their weight, in proportion to the lever s "
-                 "(M13, M14). "
-                 "A positive coefficient sags. Only where gravity is along the axis of joint 1. 3 to 14 % of "
-                 "the error of "
-                 "UR and IRB 120 arms.",
+                 "(M13, M14). A positive coefficient sags. Only where gravity is along the axis of joint 1. "
+                 "3 to 14 % of the error of UR and IRB 120 arms.",
       .record = "poses over the whole range of joints 2 and 3",
       .confounded_with = "in part `gear_harmonic` of joint 2, order 1, and `encoder_scale` of joint 2",
       .example = {.effect = Effect::link_gravity},
@@ -298,17 +303,15 @@ std::vector<EffectDescriptor> make_effects() {
             return orders;
           },
       .place = theta,
-      .follows = own_reading,
+      .follows = own<Covariate::joint_position>,
       .sentence =
           [](const EffectId& id) {
             return fmt::format("{} has an error that comes {} per turn of the joint", joint_name(id),
                                times(id.order));
           },
       .physics = "Eccentric wheels and flexible splines: δθ = sin_rad · sin(n q) + cos_rad · cos(n q), ids 5 "
-                 "and 6 of "
-                 "section 2. Orders n from 1 to 8 are tried, and the motor's N and 2N where the robot file "
-                 "has the gear "
-                 "ratio N. Harmonic drives: 30 to 90 arcsec.",
+                 "and 6 of section 2. Orders n from 1 to 8 are tried, and the motor's N and 2N where the "
+                 "robot file has the gear ratio N. Harmonic drives: 30 to 90 arcsec.",
       .record = "poses over the whole range of the joint",
       .confounded_with =
           "order 1 of joint 2 in part with `link_gravity`; a `joint_curve` of the joint contains it",
@@ -322,15 +325,14 @@ std::vector<EffectDescriptor> make_effects() {
       .keys = [](const EffectId& id,
                  const Nominal&) { return turning("gain", id, Basis::joint_position, id.joint); },
       .place = theta,
-      .follows = own_reading,
+      .follows = own<Covariate::joint_position>,
       .sentence =
           [](const EffectId& id) { return joint_name(id) + " turns a little more or less than it reads"; },
       .physics =
           "A wrong gear ratio or encoder resolution: δθ = gain · q, id 4 of section 2. Usual: 1e-5 to 5e-4.",
       .record = "poses over the whole range of the joint",
-      .confounded_with =
-          "a `joint_curve` of a joint that turns less than 360° contains it; of joint 2 within 3 to 5 % "
-          "geometry with `link_gravity` and `gear_harmonic` of order 2",
+      .confounded_with = "a `joint_curve` of a joint that turns less than 360° contains it; of joint 2 "
+                         "within 3 to 5 % geometry with `link_gravity` and `gear_harmonic` of order 2",
       .example = {.effect = Effect::encoder_scale, .joint = 3},
   });
 
@@ -382,14 +384,13 @@ std::vector<EffectDescriptor> make_effects() {
             return std::vector<double>{1, 2};
           },
       .place = [](const EffectId& id) { return link_place(id.joint, slot::alpha); },
-      .follows = own_reading,
+      .follows = own<Covariate::joint_position>,
       .sentence =
           [](const EffectId& id) {
             return fmt::format("the axis of {} wobbles {} per turn", joint_name(id), times(id.order));
           },
-      .physics =
-          "Tilt error of the bearing: α and γ of the link, the tilts about the two axes perpendicular to the "
-          "joint's, follow sin n q and cos n q, n = 1 or 2 (M2). Usual: 5 to 30 arcsec.",
+      .physics = "Tilt error of the bearing: α and γ of the link, the tilts about the two axes perpendicular "
+                 "to the joint's, follow sin n q and cos n q, n = 1 or 2 (M2). Usual: 5 to 30 arcsec.",
       .record = "poses over the whole range of the joint; orientations help",
       .confounded_with =
           "order 1 with a tilted base or tool frame and with α of the link, which geometry takes up",
@@ -409,7 +410,7 @@ std::vector<EffectDescriptor> make_effects() {
         return {key("coefficients_rad", table_term(term(id, theta(id), Basis::curve, id.joint), id.factor))};
       },
       .place = theta,
-      .follows = own_reading,
+      .follows = own<Covariate::joint_position>,
       .sentence =
           [](const EffectId& id) {
             return fmt::format("{} has an error that is a curve over its angle{}", joint_name(id),
@@ -418,13 +419,11 @@ std::vector<EffectDescriptor> make_effects() {
                                : id.factor == Factor::payload     ? ", times the payload"
                                                                   : "");
           },
-      .physics = "Any periodic error of a gear or encoder, a damaged tooth among them: a uniform periodic "
-                 "cubic B-spline "
-                 "of the reading (M6), if wanted times load torque, temperature difference or payload mass "
-                 "(`factor: "
-                 "load_torque`, `temperature`, `payload`). Its mean over the reachable range is 0. Named "
-                 "only where it "
-                 "beats every name with fewer numbers. Measured on UR5 and UR10: 200 to 500 µrad.",
+      .physics =
+          "Any periodic error of a gear or encoder, a damaged tooth among them: a uniform periodic cubic "
+          "B-spline of the reading (M6), if wanted times load torque, temperature difference or payload mass "
+          "(`factor: load_torque`, `temperature`, `payload`). Its mean over the reachable range is 0. Named "
+          "only where it beats every name with fewer numbers. Measured on UR5 and UR10: 200 to 500 µrad.",
       .record = "many poses over the whole range of the joint",
       .confounded_with = "contains `gear_harmonic` and `encoder_scale` of the same joint",
       .example = {.effect = Effect::joint_curve, .joint = 1, .coefficients = 6},
@@ -439,19 +438,14 @@ std::vector<EffectDescriptor> make_effects() {
       .is_nonnegative = true,
       .needs = Needs::direction,
       .place = theta,
-      .follows =
-          [](const EffectId& id) {
-            return Follows{Covariate::direction, {id.joint}};
-          },
+      .follows = own<Covariate::direction>,
       .sentence =
           [](const EffectId& id) {
             return joint_name(id) + " stays behind by half a gap, on the side it comes from";
           },
       .physics = "Play of the gear: the link stays behind the motion by half the gap, δθ = −half_gap · "
-                 "direction, id 7 of "
-                 "section 2. A negative half gap is not backlash. The controller changes the direction only "
-                 "after the "
-                 "joint has moved back by a dead band. Usual: 10 to 60 arcsec.",
+                 "direction, id 7 of section 2. A negative half gap is not backlash. The controller changes "
+                 "the direction only after the joint has moved back by a dead band. Usual: 10 to 60 arcsec.",
       .record = "the joint approached from both sides",
       .confounded_with = "`readout_lag`, where only directions and no motions are recorded",
       .example = {.effect = Effect::backlash, .joint = 2},
@@ -467,15 +461,11 @@ std::vector<EffectDescriptor> make_effects() {
       .is_nonnegative = true,
       .needs = Needs::moves,
       .place = theta,
-      .follows =
-          [](const EffectId& id) {
-            return Follows{Covariate::relative_speed, {id.joint}};
-          },
+      .follows = own<Covariate::relative_speed>,
       .sentence = [](const EffectId& id) { return joint_name(id) + " was read before the arm had stopped"; },
-      .physics =
-          "The readings were taken while the arm still moved: δθ in proportion to the relative speed u of "
-          "the joint "
-          "in a synchronised motion, id 8 of section 2. A fault of the measurement. About 1 mrad (IRB 120).",
+      .physics = "The readings were taken while the arm still moved: δθ in proportion to the relative speed "
+                 "u of the joint in a synchronised motion, id 8 of section 2. A fault of the measurement. "
+                 "About 1 mrad (IRB 120).",
       .record =
           "motions of different length and mixture of joints before the poses; better, wait before reading",
       .confounded_with = "`backlash`, where the joint always moves by the same share",
@@ -495,10 +485,7 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place) { return 1e-5; },
       .needs = Needs::temperature,
       .place = [](const EffectId& id) { return link_place(std::max(1U, id.link), slot::a); },
-      .follows =
-          [](const EffectId&) {
-            return Follows{Covariate::temperature, {}};
-          },
+      .follows = the<Covariate::temperature>,
       .sentence =
           [](const EffectId& id) {
             return id.link == 0 ? std::string("all links grow with the temperature")
@@ -530,18 +517,14 @@ std::vector<EffectDescriptor> make_effects() {
       .usual_size = [](Place p) { return (is_length(p) ? 1e-5 : radians(0.001)) / 3600; },
       .needs = Needs::time,
       .forms = {{0, 1, 2}, {3, 4, 5}, {0, 1, 2, 3, 4, 5}},
-      .place =
-          [](const EffectId&) {
-            return Place{body::base, slot::x};
-          },
-      .follows = the_time,
+      .place = always<body::base, slot::x>,
+      .follows = the<Covariate::time>,
       .sentence =
           [](const EffectId&) {
             return std::string("the base drifts against the instrument while time passes");
           },
-      .physics =
-          "The stand of the robot or of the instrument moves uniformly in time: B follows `time_s`, id 10 of "
-          "section 2. A fault of the measurement. Usual: 30 to 60 µm in a session.",
+      .physics = "The stand of the robot or of the instrument moves uniformly in time: B follows `time_s`, "
+                 "id 10 of section 2. A fault of the measurement. Usual: 30 to 60 µm in a session.",
       .record = "times of the rows; some early poses once more at the end",
       .confounded_with = "`thermal_growth`, where temperature and time go together; `reflector_slip`",
       .example = {.effect = Effect::base_drift},
@@ -551,29 +534,17 @@ std::vector<EffectDescriptor> make_effects() {
       .effect = Effect::reflector_slip,
       .name = "reflector_slip",
       .selectors = {Selector::after},
-      .keys =
-          [](const EffectId& id, const Nominal&) {
-            Keys keys;
-            for (std::uint8_t s = slot::x; s <= slot::z; ++s) {
-              const Place place{body::point, s};
-              keys.push_back(
-                  key(slot_name(place) + "_mm", term(id, place, Basis::step, 0, id.after_s), unit::mm));
-            }
-            return keys;
-          },
+      .keys = [](const EffectId& id,
+                 const Nominal&) { return moving_the_point(id, Basis::step, "_mm", unit::mm); },
       .needs = Needs::time,
-      .place =
-          [](const EffectId&) {
-            return Place{body::point, slot::x};
-          },
-      .follows = the_time,
+      .place = always<body::point, slot::x>,
+      .follows = the<Covariate::time>,
       .sentence =
           [](const EffectId& id) {
             return fmt::format("the measured point slipped after {:.0f} s", id.after_s);
           },
       .physics = "A reflector was knocked: from the time `after_s` on the measured point is elsewhere in "
-                 "Ftool, id 16 of "
-                 "section 2, E of (M1). A fault of the measurement.",
+                 "Ftool, id 16 of section 2, E of (M1). A fault of the measurement.",
       .record = "times of the rows; some early poses once more at the end",
       .confounded_with = "`base_drift`, where few rows were measured after the step",
       .example = {.effect = Effect::reflector_slip, .after_s = 3600},
@@ -584,28 +555,19 @@ std::vector<EffectDescriptor> make_effects() {
       .name = "reflector_drift",
       .keys =
           [](const EffectId& id, const Nominal&) {
-            Keys keys;
-            for (std::uint8_t s = slot::x; s <= slot::z; ++s) {
-              const Place place{body::point, s};
-              keys.push_back(
-                  key(slot_name(place) + "_mm_per_h", term(id, place, Basis::time), unit::mm_per_hour));
-            }
-            return keys;
+            return moving_the_point(id, Basis::time, "_mm_per_h", unit::mm_per_hour);
           },
       .usual_size = [](Place) { return 1e-5 / 3600; },
       .needs = Needs::time,
-      .place =
-          [](const EffectId&) {
-            return Place{body::point, slot::x};
-          },
-      .follows = the_time,
+      .place = always<body::point, slot::x>,
+      .follows = the<Covariate::time>,
       .sentence =
           [](const EffectId&) {
             return std::string("the measured point drifts in the tool's frame while time passes");
           },
       .physics =
-          "The reflector creeps in its nest, or its holder warms up: the measured point moves uniformly "
-          "in Ftool with `time_s`, id 10 of section 2, E of (M1). A fault of the measurement.",
+          "The reflector creeps in its nest, or its holder warms up: the measured point moves uniformly in "
+          "Ftool with `time_s`, id 10 of section 2, E of (M1). A fault of the measurement.",
       .record = "times of the rows; some early poses once more at the end, in several orientations",
       .confounded_with =
           "`base_drift`, where all rows have nearly one orientation; `reflector_slip`, where rows are few",
@@ -635,9 +597,8 @@ std::vector<EffectDescriptor> make_effects() {
                                covariate_name(id.covariate[1], id.covariate_joint[1]));
           },
       .physics = "Whatever is there and has no name: a function of two covariates at one place, bilinear on "
-                 "a grid (M7). "
-                 "Nodes of joint readings are in degrees. `predict` and `validate` use it, `push` only with "
-                 "`--allow-unnamed`.",
+                 "a grid (M7). Nodes of joint readings are in degrees. `predict` and `validate` use it, "
+                 "`push` only with `--allow-unnamed`.",
       .record = "more rows where it is concentrated",
       .confounded_with = "not compared with names: it stands where none of them explains the rows",
       .example = {.effect = Effect::unnamed,

@@ -3,8 +3,7 @@
 /// One descriptor per effect: terms, keys, units, needed columns, sign, place, sentence and rank. Whatever else knows
 /// something about one effect asks its descriptor; only number and physical bounds are in flexcomp/effect.hpp, because
 /// the controller shares them.
-#ifndef FLEXCOMP_HOST_MODEL_EFFECTS_DESCRIPTOR_HPP
-#define FLEXCOMP_HOST_MODEL_EFFECTS_DESCRIPTOR_HPP
+#pragma once
 
 #include <algorithm>
 #include <array>
@@ -116,5 +115,3 @@ const EffectDescriptor& descriptor(Effect effect);
 bool follows_own_joint(const EffectId& id);
 
 }  // namespace flexcomp::host
-
-#endif

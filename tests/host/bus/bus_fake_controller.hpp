@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// A controller that does what a test tells it to: just enough of the parameter store to answer the clients.
-#ifndef FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
-#define FLEXCOMP_TESTS_HOST_BUS_BUS_FAKE_CONTROLLER_HPP
+#pragma once
 
 #include <gtest/gtest.h>
 
@@ -157,5 +156,3 @@ inline void expect_exact_probe(host::ControllerClient& client) {
 }
 
 }  // namespace flexcomp::fake
-
-#endif

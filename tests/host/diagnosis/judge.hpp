@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What a diagnosis said of a hidden case, held against the truth and the oracle.
-#ifndef FLEXCOMP_TESTS_DIAGNOSIS_JUDGE_HPP
-#define FLEXCOMP_TESTS_DIAGNOSIS_JUDGE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -62,5 +61,3 @@ struct Rate {
 };
 
 }  // namespace judging
-
-#endif

@@ -2,8 +2,7 @@
 /// \file
 /// The best that the data of a hidden case allow: the same estimator, told the truth; and by how much the truth beats
 /// every other name.
-#ifndef FLEXCOMP_TESTS_DIAGNOSIS_ORACLE_HPP
-#define FLEXCOMP_TESTS_DIAGNOSIS_ORACLE_HPP
+#pragma once
 
 #include <string>
 #include <vector>
@@ -50,5 +49,3 @@ double rms_m(const flexcomp::host::Estimate& estimate, const flexcomp::host::Rob
              const std::vector<flexcomp::host::Observation>& rows);
 
 }  // namespace judging
-
-#endif
