@@ -155,9 +155,9 @@ Reference by_singular_values(const std::vector<Block>& blocks, Eigen::Index nuis
   Eigen::MatrixXd p = h.rightCols(h.cols() - nuisance);
   if (nuisance > 0) {
     const Eigen::MatrixXd f = h.leftCols(nuisance);
-    p -= f * f.bdcSvd(Eigen::ComputeThinU | Eigen::ComputeThinV).solve(p);
+    p -= f * f.colPivHouseholderQr().solve(p);
   }
-  const Eigen::VectorXd s = p.bdcSvd().singularValues();
+  const Eigen::VectorXd s = p.jacobiSvd().singularValues();
   return {s.array().square().inverse().sum(), 2 * s.array().log().sum()};
 }
 
