@@ -9,8 +9,8 @@
 
 namespace support {
 
-inline const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
-inline const std::string data = FLEXCOMP_SOURCE_DIR "/tests/data/";
+const std::string robots = FLEXCOMP_SOURCE_DIR "/host/robots/";
+const std::string data = FLEXCOMP_SOURCE_DIR "/tests/data/";
 
 /// Of "tx60l": host/robots/tx60l.yaml.
 inline flexcomp::host::Robot robot(const std::string& name) {

@@ -205,7 +205,7 @@ TEST(SdoClient, CarriesAnyLengthBothWays) {
     far.server.sizes = sizes;
     Bus bus(std::ref(far.server));
     SdoClient client(bus.near(), node, milliseconds(1000));
-    for (const std::size_t size : {0, 1, 2, 3, 4, 5, 6, 7, 8, 13, 14, 15, 21, 500, 1000}) {
+    for (const std::size_t size : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 7U, 8U, 13U, 14U, 15U, 21U, 500U, 1000U}) {
       const Bytes sent = numbered_bytes(size);
       client.download({0x2010, 1}, sent);
       EXPECT_EQ(far.value, sent) << size;

@@ -218,7 +218,7 @@ TEST_P(ModbusClient, PushesAndReadsBack) {
   const auto client = server.client();
   EXPECT_EQ(client->capability().values, 768U);
   // Whole windows, an odd length, less than a window.
-  for (const std::size_t size : {484, 1001, 100, 2000, 246}) {
+  for (const std::size_t size : {484U, 1001U, 100U, 2000U, 246U}) {
     const Bytes image = numbered_bytes(size);
     push_image(*client, image);
     EXPECT_EQ(server.device.active, image) << size;
