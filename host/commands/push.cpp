@@ -5,45 +5,21 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "bus/transfer.hpp"
-#include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
 #include "commands/progress_bar.hpp"
-#include "commands/result_text.hpp"
+#include "commands/push.hpp"
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
 #include "flexcomp/bytes.hpp"
 #include "json.hpp"
 #include "model/parameter_image.hpp"
-#include "model/set_difference.hpp"
 
 namespace flexcomp::host {
-namespace {
-
-struct Push {
-  BusOptions bus;
-  std::string set;
-  std::string robot;
-  std::string image;
-  std::optional<std::uint32_t> sequence;
-  std::optional<double> trial_s;
-  bool confirm = false;
-  bool allow_unnamed = false;
-  bool dry_run = false;
-  std::string against;
-  const CLI::Option* to = nullptr;
-
-  void run() const;
-  Bytes make(ControllerClient& client, std::vector<std::string>& left_out) const;
-  void show_changes() const;
-  void check_options() const;
-  void say_left_out(const std::vector<std::string>& names) const;
-};
 
 void Push::check_options() const {
   refuse_same_file({{"CAL.yaml", set}, {"--robot", robot}, {"--against", against}},
@@ -132,65 +108,6 @@ void Push::run() const {
                       bytes.size(), took.count()));
   bus.write_json(result);
 }
-
-/// The tool is looked at in so many poses.
-constexpr std::size_t dry_run_poses = 500;
-
-/// A set of parameters as a controller holds it, from a file: a calibration, or an image.
-TermSet held_set(const std::string& path, const Robot& robot, const ImageOptions& options) {
-  const std::optional<Bytes> image = read_image_file(path);
-  const Bytes bytes = image ? *image : make_image(load_calibration(path, robot), robot, 1, options);
-  return calibration_from_image(bytes, robot, path).terms;
-}
-
-/// Reads and compares; not one byte is written to the controller.
-void Push::show_changes() const {
-  Json result{{"dry_run", true}};
-  std::vector<std::string> left_out;
-  Robot for_robot;
-  TermSet now;
-  TermSet next;
-  if (against.empty()) {
-    const std::optional<Bytes> ready = read_image_file(set);
-    const std::unique_ptr<ControllerClient> client = bus.connect();
-    for_robot = robot_of(*client, robot);
-    const Bytes bytes = ready ? *ready : make(*client, left_out);
-    // A file that is no image is the file's fault; what a sound one asks for may be beyond the controller.
-    next = calibration_from_image(bytes, for_robot, set).terms;
-    refuse_beyond_capability(*client, set, bytes);
-    const wire::Status status = client->status();
-    Bytes active;
-    if (status.active_slot != wire::no_slot) {
-      ProgressBar bar("reading the active set", bus.quiet);
-      active = client->active_image(bar.callback());
-    }
-    if (!active.empty()) now = calibration_held(*client, active, for_robot).terms;
-    const std::string before =
-        active.empty() ? "no set, commands pass through" : fmt::format("set {}", status.active_sequence);
-    bus.say(fmt::format("{}: holds {}; {} would be sent ({} bytes). Nothing was sent.", client->where(),
-                        before, set, bytes.size()));
-    result["bus"] = client->where();
-    result["sequence"] = active.empty() ? 0U : status.active_sequence;
-    result["bytes"] = bytes.size();
-  } else {
-    if (robot.empty()) throw CLI::RequiredError("--robot (with --against)");
-    for_robot = load_robot(robot);
-    ImageOptions options;
-    options.allow_unnamed = allow_unnamed;
-    now = held_set(against, for_robot, options);
-    next = held_set(set, for_robot, options);
-    bus.say(fmt::format("{}: would take the place of {}. Nothing was sent.", set, against));
-    result["against"] = against;
-  }
-  const SetDifference d = difference(now, next, for_robot, dry_run_poses);
-  say_left_out(left_out);
-  bus.say(difference_table(d));
-  result["left_out"] = left_out;
-  result.update(to_json(d));
-  bus.write_json(result);
-}
-
-}  // namespace
 
 void add_push(CLI::App& app) {
   auto [command, state] = add_command<Push>(

@@ -122,10 +122,8 @@ std::string times(double n) {
   return fmt::format("{:g} times", n);
 }
 
-std::vector<EffectDescriptor> make_effects() {
-  std::vector<EffectDescriptor> list;
-
-  list.push_back({
+EffectDescriptor joint_compliance() {
+  return {
       .effect = Effect::joint_compliance,
       .name = "joint_compliance",
       .selectors = {Selector::joint},
@@ -140,15 +138,18 @@ std::vector<EffectDescriptor> make_effects() {
       .place = theta,
       .follows = the<Covariate::payload>,
       .sentence = [](const EffectId& id) { return joint_name(id) + " deflects under the load"; },
-      .physics = "The joint is a linear torsional spring: it turns in proportion to the torque of payload "
-                 "and external force about its axis (M11, M12). The coefficient is a compliance, 1/K. Usual: "
-                 "1e-8 to 2e-3 rad/(N·m).",
+      .physics =
+          "The joint is a linear torsional spring: it turns in proportion to the torque of payload "
+          "and external force about its axis (M11, M12). The coefficient is a compliance, 1/K. Usual: "
+          "1e-8 to 2e-3 rad/(N·m).",
       .record = "two payloads, one of them small",
       .confounded_with = "`payload_error` (a scale of all loads), unless one load is trusted",
       .example = {.effect = Effect::joint_compliance, .joint = 2},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor nonlinear_compliance() {
+  return {
       .effect = Effect::nonlinear_compliance,
       .name = "nonlinear_compliance",
       .selectors = {Selector::joint},
@@ -162,14 +163,17 @@ std::vector<EffectDescriptor> make_effects() {
           [](const EffectId& id) {
             return joint_name(id) + " deflects under the load otherwise than in proportion";
           },
-      .physics = "Gears stiffen with torque: a cubic part of the joint's deflection beside the linear one "
-                 "(M11). Negative where the joint stiffens. Usual: 0.3 to 1 arcmin at rated torque.",
+      .physics =
+          "Gears stiffen with torque: a cubic part of the joint's deflection beside the linear one "
+          "(M11). Negative where the joint stiffens. Usual: 0.3 to 1 arcmin at rated torque.",
       .record = "three payloads over the rated range",
       .confounded_with = "`joint_compliance` of the same joint, where all torques are of one size",
       .example = {.effect = Effect::nonlinear_compliance, .joint = 3},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor link_bending() {
+  return {
       .effect = Effect::link_bending,
       .name = "link_bending",
       .selectors = {Selector::link},
@@ -188,16 +192,19 @@ std::vector<EffectDescriptor> make_effects() {
       .follows = the<Covariate::payload>,
       .sentence =
           [](const EffectId& id) { return fmt::format("link {} bends sideways under the load", id.link); },
-      .physics = "The link, and the bearing at its end, tilt under the moment of the load about x and y of "
-                 "the frame after the link (M10). The tilt about y is identified only where the link's twist "
-                 "is small (\\|sin α\\| ≤ 0.1): elsewhere it is the joint's own motion. Of link 6 it is the "
-                 "bending of the tool flange.",
+      .physics =
+          "The link, and the bearing at its end, tilt under the moment of the load about x and y of "
+          "the frame after the link (M10). The tilt about y is identified only where the link's twist "
+          "is small (\\|sin α\\| ≤ 0.1): elsewhere it is the joint's own motion. Of link 6 it is the "
+          "bending of the tool flange.",
       .record = "two payloads, the load far from the flange, the wrist turned",
       .confounded_with = "`joint_compliance` of neighbouring joints, `base_compliance` for link 1",
       .example = {.effect = Effect::link_bending, .link = 3},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor base_compliance() {
+  return {
       .effect = Effect::base_compliance,
       .name = "base_compliance",
       .selectors = {Selector::pivot},
@@ -215,15 +222,18 @@ std::vector<EffectDescriptor> make_effects() {
             return fmt::format("the base tilts under the load, about a pivot at z = {:.0f} mm",
                                id.pivot_z_m * 1e3);
           },
-      .physics = "Pedestal or rail: the base tilts under the moment of payload and external force about x "
-                 "and y of F0 through the pivot (0, 0, `pivot_z_mm`) (M10). The search takes the lowest "
-                 "point of the bodies that stand on the base for the pivot.",
+      .physics =
+          "Pedestal or rail: the base tilts under the moment of payload and external force about x "
+          "and y of F0 through the pivot (0, 0, `pivot_z_mm`) (M10). The search takes the lowest "
+          "point of the bodies that stand on the base for the pivot.",
       .record = "two payloads, the arm stretched out in several directions",
       .confounded_with = "`joint_compliance` of joint 2 where the pivot is near that joint's height",
       .example = {.effect = Effect::base_compliance, .pivot_z_m = -0.375},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor payload_error() {
+  return {
       .effect = Effect::payload_error,
       .name = "payload_error",
       .keys =
@@ -242,15 +252,18 @@ std::vector<EffectDescriptor> make_effects() {
       .place = always<body::load, slot::mass>,
       .follows = the<Covariate::payload>,
       .sentence = [](const EffectId&) { return std::string("the payload is not what was declared"); },
-      .physics = "Mass and centre of mass of the payload are corrected by the same amounts in every row, "
-                 "before torques are taken (section 3). 10 % of the mass is 10 % of the sag.",
+      .physics =
+          "Mass and centre of mass of the payload are corrected by the same amounts in every row, "
+          "before torques are taken (section 3). 10 % of the mass is 10 % of the sag.",
       .record = "two payloads of which one is trusted (none at all, say)",
       .confounded_with =
           "`joint_compliance`: a scale error of all loads is exactly a scale of all compliances",
       .example = {.effect = Effect::payload_error},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor link_gravity() {
+  return {
       .effect = Effect::link_gravity,
       .name = "link_gravity",
       .rule = [](const EffectId&, const Nominal& robot) -> Error {
@@ -273,15 +286,18 @@ std::vector<EffectDescriptor> make_effects() {
           },
       .sentence =
           [](const EffectId&) { return std::string("upper arm and forearm sag under their own weight"); },
-      .physics = "Upper arm and forearm load joints 2 and 3 with their weight, in proportion to the lever s "
-                 "(M13, M14). A positive coefficient sags. Only where gravity is along the axis of joint 1. "
-                 "3 to 14 % of the error of UR and IRB 120 arms.",
+      .physics =
+          "Upper arm and forearm load joints 2 and 3 with their weight, in proportion to the lever s "
+          "(M13, M14). A positive coefficient sags. Only where gravity is along the axis of joint 1. "
+          "3 to 14 % of the error of UR and IRB 120 arms.",
       .record = "poses over the whole range of joints 2 and 3",
       .confounded_with = "in part `gear_harmonic` of joint 2, order 1, and `encoder_scale` of joint 2",
       .example = {.effect = Effect::link_gravity},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor gear_harmonic() {
+  return {
       .effect = Effect::gear_harmonic,
       .name = "gear_harmonic",
       .selectors = {Selector::joint, Selector::order},
@@ -309,16 +325,19 @@ std::vector<EffectDescriptor> make_effects() {
             return fmt::format("{} has an error that comes {} per turn of the joint", joint_name(id),
                                times(id.order));
           },
-      .physics = "Eccentric wheels and flexible splines: δθ = sin_rad · sin(n q) + cos_rad · cos(n q), ids 5 "
-                 "and 6 of section 2. Orders n from 1 to 8 are tried, and the motor's N and 2N where the "
-                 "robot file has the gear ratio N. Harmonic drives: 30 to 90 arcsec.",
+      .physics =
+          "Eccentric wheels and flexible splines: δθ = sin_rad · sin(n q) + cos_rad · cos(n q), ids 5 "
+          "and 6 of section 2. Orders n from 1 to 8 are tried, and the motor's N and 2N where the "
+          "robot file has the gear ratio N. Harmonic drives: 30 to 90 arcsec.",
       .record = "poses over the whole range of the joint",
       .confounded_with =
           "order 1 of joint 2 in part with `link_gravity`; a `joint_curve` of the joint contains it",
       .example = {.effect = Effect::gear_harmonic, .joint = 3, .order = 1},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor encoder_scale() {
+  return {
       .effect = Effect::encoder_scale,
       .name = "encoder_scale",
       .selectors = {Selector::joint},
@@ -331,12 +350,15 @@ std::vector<EffectDescriptor> make_effects() {
       .physics =
           "A wrong gear ratio or encoder resolution: δθ = gain · q, id 4 of section 2. Usual: 1e-5 to 5e-4.",
       .record = "poses over the whole range of the joint",
-      .confounded_with = "a `joint_curve` of a joint that turns less than 360° contains it; of joint 2 "
-                         "within 3 to 5 % geometry with `link_gravity` and `gear_harmonic` of order 2",
+      .confounded_with =
+          "a `joint_curve` of a joint that turns less than 360° contains it; of joint 2 "
+          "within 3 to 5 % geometry with `link_gravity` and `gear_harmonic` of order 2",
       .example = {.effect = Effect::encoder_scale, .joint = 3},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor joint_coupling() {
+  return {
       .effect = Effect::joint_coupling,
       .name = "joint_coupling",
       .selectors = {Selector::joint, Selector::from},
@@ -361,9 +383,11 @@ std::vector<EffectDescriptor> make_effects() {
       .record = "both joints over their whole ranges, independently of each other",
       .confounded_with = "`encoder_scale`, where the poses turn both joints together",
       .example = {.effect = Effect::joint_coupling, .joint = 6, .from = 5},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor axis_wobble() {
+  return {
       .effect = Effect::axis_wobble,
       .name = "axis_wobble",
       .selectors = {Selector::joint, Selector::order},
@@ -389,15 +413,18 @@ std::vector<EffectDescriptor> make_effects() {
           [](const EffectId& id) {
             return fmt::format("the axis of {} wobbles {} per turn", joint_name(id), times(id.order));
           },
-      .physics = "Tilt error of the bearing: α and γ of the link, the tilts about the two axes perpendicular "
-                 "to the joint's, follow sin n q and cos n q, n = 1 or 2 (M2). Usual: 5 to 30 arcsec.",
+      .physics =
+          "Tilt error of the bearing: α and γ of the link, the tilts about the two axes perpendicular "
+          "to the joint's, follow sin n q and cos n q, n = 1 or 2 (M2). Usual: 5 to 30 arcsec.",
       .record = "poses over the whole range of the joint; orientations help",
       .confounded_with =
           "order 1 with a tilted base or tool frame and with α of the link, which geometry takes up",
       .example = {.effect = Effect::axis_wobble, .joint = 2, .order = 1},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor joint_curve() {
+  return {
       .effect = Effect::joint_curve,
       .name = "joint_curve",
       .selectors = {Selector::joint, Selector::size, Selector::factor},
@@ -427,9 +454,11 @@ std::vector<EffectDescriptor> make_effects() {
       .record = "many poses over the whole range of the joint",
       .confounded_with = "contains `gear_harmonic` and `encoder_scale` of the same joint",
       .example = {.effect = Effect::joint_curve, .joint = 1, .coefficients = 6},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor backlash() {
+  return {
       .effect = Effect::backlash,
       .name = "backlash",
       .selectors = {Selector::joint},
@@ -443,15 +472,18 @@ std::vector<EffectDescriptor> make_effects() {
           [](const EffectId& id) {
             return joint_name(id) + " stays behind by half a gap, on the side it comes from";
           },
-      .physics = "Play of the gear: the link stays behind the motion by half the gap, δθ = −half_gap · "
-                 "direction, id 7 of section 2. A negative half gap is not backlash. The controller changes "
-                 "the direction only after the joint has moved back by a dead band. Usual: 10 to 60 arcsec.",
+      .physics =
+          "Play of the gear: the link stays behind the motion by half the gap, δθ = −half_gap · "
+          "direction, id 7 of section 2. A negative half gap is not backlash. The controller changes "
+          "the direction only after the joint has moved back by a dead band. Usual: 10 to 60 arcsec.",
       .record = "the joint approached from both sides",
       .confounded_with = "`readout_lag`, where only directions and no motions are recorded",
       .example = {.effect = Effect::backlash, .joint = 2},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor readout_lag() {
+  return {
       .effect = Effect::readout_lag,
       .name = "readout_lag",
       .selectors = {Selector::joint},
@@ -463,16 +495,19 @@ std::vector<EffectDescriptor> make_effects() {
       .place = theta,
       .follows = own<Covariate::relative_speed>,
       .sentence = [](const EffectId& id) { return joint_name(id) + " was read before the arm had stopped"; },
-      .physics = "The readings were taken while the arm still moved: δθ in proportion to the relative speed "
-                 "u of the joint in a synchronised motion, id 8 of section 2. A fault of the measurement. "
-                 "About 1 mrad (IRB 120).",
+      .physics =
+          "The readings were taken while the arm still moved: δθ in proportion to the relative speed "
+          "u of the joint in a synchronised motion, id 8 of section 2. A fault of the measurement. "
+          "About 1 mrad (IRB 120).",
       .record =
           "motions of different length and mixture of joints before the poses; better, wait before reading",
       .confounded_with = "`backlash`, where the joint always moves by the same share",
       .example = {.effect = Effect::readout_lag, .joint = 1},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor thermal_growth() {
+  return {
       .effect = Effect::thermal_growth,
       .name = "thermal_growth",
       .selectors = {Selector::link},
@@ -497,9 +532,11 @@ std::vector<EffectDescriptor> make_effects() {
       .record = "temperatures over some kelvin, in an order that does not follow the pose",
       .confounded_with = "`base_drift`, where temperature and time go together (\\|correlation\\| above 0.9)",
       .example = {.effect = Effect::thermal_growth},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor base_drift() {
+  return {
       .effect = Effect::base_drift,
       .name = "base_drift",
       .keys =
@@ -523,14 +560,17 @@ std::vector<EffectDescriptor> make_effects() {
           [](const EffectId&) {
             return std::string("the base drifts against the instrument while time passes");
           },
-      .physics = "The stand of the robot or of the instrument moves uniformly in time: B follows `time_s`, "
-                 "id 10 of section 2. A fault of the measurement. Usual: 30 to 60 µm in a session.",
+      .physics =
+          "The stand of the robot or of the instrument moves uniformly in time: B follows `time_s`, "
+          "id 10 of section 2. A fault of the measurement. Usual: 30 to 60 µm in a session.",
       .record = "times of the rows; some early poses once more at the end",
       .confounded_with = "`thermal_growth`, where temperature and time go together; `reflector_slip`",
       .example = {.effect = Effect::base_drift},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor reflector_slip() {
+  return {
       .effect = Effect::reflector_slip,
       .name = "reflector_slip",
       .selectors = {Selector::after},
@@ -543,14 +583,17 @@ std::vector<EffectDescriptor> make_effects() {
           [](const EffectId& id) {
             return fmt::format("the measured point slipped after {:.0f} s", id.after_s);
           },
-      .physics = "A reflector was knocked: from the time `after_s` on the measured point is elsewhere in "
-                 "Ftool, id 16 of section 2, E of (M1). A fault of the measurement.",
+      .physics =
+          "A reflector was knocked: from the time `after_s` on the measured point is elsewhere in "
+          "Ftool, id 16 of section 2, E of (M1). A fault of the measurement.",
       .record = "times of the rows; some early poses once more at the end",
       .confounded_with = "`base_drift`, where few rows were measured after the step",
       .example = {.effect = Effect::reflector_slip, .after_s = 3600},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor reflector_drift() {
+  return {
       .effect = Effect::reflector_drift,
       .name = "reflector_drift",
       .keys =
@@ -572,9 +615,11 @@ std::vector<EffectDescriptor> make_effects() {
       .confounded_with =
           "`base_drift`, where all rows have nearly one orientation; `reflector_slip`, where rows are few",
       .example = {.effect = Effect::reflector_drift},
-  });
+  };
+}
 
-  list.push_back({
+EffectDescriptor unnamed() {
+  return {
       .effect = Effect::unnamed,
       .name = "unnamed",
       .selectors = {Selector::place, Selector::grid},
@@ -596,9 +641,10 @@ std::vector<EffectDescriptor> make_effects() {
                                place_name(id.place), covariate_name(id.covariate[0], id.covariate_joint[0]),
                                covariate_name(id.covariate[1], id.covariate_joint[1]));
           },
-      .physics = "Whatever is there and has no name: a function of two covariates at one place, bilinear on "
-                 "a grid (M7). Nodes of joint readings are in degrees. `predict` and `validate` use it, "
-                 "`push` only with `--allow-unnamed`.",
+      .physics =
+          "Whatever is there and has no name: a function of two covariates at one place, bilinear on "
+          "a grid (M7). Nodes of joint readings are in degrees. `predict` and `validate` use it, "
+          "`push` only with `--allow-unnamed`.",
       .record = "more rows where it is concentrated",
       .confounded_with = "not compared with names: it stands where none of them explains the rows",
       .example = {.effect = Effect::unnamed,
@@ -606,14 +652,19 @@ std::vector<EffectDescriptor> make_effects() {
                   .covariate = {Covariate::joint_position, Covariate::payload},
                   .covariate_joint = {2, 0},
                   .node = {std::vector<double>{radians(-90), radians(90)}, std::vector<double>{0, 2}}},
-  });
-  return list;
+  };
 }
 
 }  // namespace
 
 const std::vector<EffectDescriptor>& all_effects() {
-  static const std::vector<EffectDescriptor> list = make_effects();
+  static const std::vector<EffectDescriptor> list{
+      joint_compliance(), nonlinear_compliance(), link_bending(),
+      base_compliance(),  payload_error(),        link_gravity(),
+      gear_harmonic(),    encoder_scale(),        joint_coupling(),
+      axis_wobble(),      joint_curve(),          backlash(),
+      readout_lag(),      thermal_growth(),       base_drift(),
+      reflector_slip(),   reflector_drift(),      unnamed()};
   return list;
 }
 
