@@ -19,7 +19,7 @@ for name in ("robot_file", "cell_file", "capsule", "tolerance_file", "calibratio
     source = (root / "host/files" / (name + ".cpp")).read_text(encoding="utf-8")
     for keys in re.findall(r"require_keys\(\s*\{([^}]*)\}", source): known |= set(re.findall(r'"(\w+)"', keys))
 data = (root / "host/files/data_file.cpp").read_text(encoding="utf-8")
-columns = re.findall(r'\buse\("(\w+)"\)', data)
+columns = re.findall(r'\bvisit\("(\w+)"', data)
 if len(known) < 30 or len(columns) < 5: sys.exit("only %d keys, %d columns: are the readers still read rightly?" % (len(known), len(columns)))
 for key in sorted((known | set(columns)) - documented):
     failed = True
