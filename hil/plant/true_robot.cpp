@@ -170,8 +170,6 @@ void Arm::apply(const Effect& e) {
     apply_to_base(e);
   } else if (e.name == "reflector_slip") {
     if (context.time_s >= e.of("after")) slip += Vector(e.of("x"), e.of("y"), e.of("z"));
-  } else if (e.name == "reflector_drift") {
-    slip += context.time_s * Vector(e.of("x_per_s"), e.of("y_per_s"), e.of("z_per_s"));
   } else if (e.name != "payload_error") {  // is part of the load
     apply_to_joint(e);
   }

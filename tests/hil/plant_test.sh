@@ -38,7 +38,6 @@ effects:
   - {effect: base_drift, x_mm_per_h: 0.02, y_mm_per_h: -0.03, z_mm_per_h: 0.04, rx_deg_per_h: 0.001, ry_deg_per_h: 0.002, rz_deg_per_h: 0.003}
   - {effect: base_compliance, pivot_z_mm: -375, rx_rad_per_nm: 1.0e-6, ry_rad_per_nm: 2.0e-6}
   - {effect: payload_error, mass_kg: 0.1, com_x_mm: 5, com_y_mm: -3, com_z_mm: 10}
-  - {effect: reflector_drift, x_mm_per_h: 0.05, y_mm_per_h: -0.02, z_mm_per_h: 0.03}
 YAML
 
 # apart A B: the largest difference of position [mm] and of the quaternion's components between two files of poses
