@@ -60,7 +60,7 @@ std::string describe(wire::Command command) {
 
 std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail) {
   if (answer != wire::Answer::refused) return wire::text(answer);
-  const std::string why = text(refusal);
+  std::string why = text(refusal);
   switch (refusal) {
     case Refusal::unknown_basis:
       return fmt::format("{} (basis {})", why, detail);

@@ -115,7 +115,7 @@ class ControllerClient {
  private:
   template <class Action>
   void retry_while_busy(const std::string& request, const Action& action);
-  [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& refusal);
+  [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& from_bus);
 
   ClientOptions options_;
   std::string where_;

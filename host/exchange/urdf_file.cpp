@@ -274,6 +274,7 @@ const UrdfLinkNode* find_tip(const UrdfTree& tree, const std::vector<const UrdfL
         fmt::format("ends {}", fmt::join(ends, ", ")));
   }
   std::vector<std::string> names;
+  names.reserve(tips.size());
   for (const UrdfLinkNode* tip : tips) names.push_back(tip->name);
   throw tree.argument_error("tip", "to be told which of several links to take",
                             fmt::format("{}", fmt::join(names, ", ")));

@@ -138,7 +138,7 @@ class SetReader {
   }
 
   /// Constant terms of one body under keys such as x_mm, each with its sigma.
-  void constants(const YamlField& entry, std::uint8_t body, std::size_t slots,
+  void constants(const YamlField& entry, std::uint8_t body, std::uint8_t slots,
                  const std::string& other_key = "") {
     std::vector<std::string> names;
     for (std::uint8_t s = 0; s < slots; ++s) names.push_back(key_of({body, s}));
@@ -171,6 +171,7 @@ class SetReader {
 
     const std::vector<EffectKey> list = keys(id, robot_.nominal);
     std::vector<std::string> names;
+    names.reserve(list.size());
     for (const EffectKey& key : list) names.push_back(key.key);
     require_keys(entry, names, selectors);
     const std::uint16_t instance = next_instance(out_.terms);

@@ -46,6 +46,7 @@ void fix(const std::vector<FixedParameter>& fixed, const Robot& robot, TermSet& 
     const auto found = std::ranges::find(parameters, f.name, &Parameter::name);
     if (found == parameters.end()) {
       std::vector<std::string> names;
+      names.reserve(parameters.size());
       for (const Parameter& p : parameters) names.push_back(p.name);
       const std::string near = nearest(f.name, names);
       throw InputError("", 0, f.name, "a parameter of this model of " + robot.name,

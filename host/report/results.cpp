@@ -23,6 +23,7 @@ using Row = const Observation&;
 
 std::vector<double> values_of(const std::vector<Observation>& rows, const std::function<double(Row)>& of) {
   std::vector<double> values;
+  values.reserve(rows.size());
   for (const Observation& row : rows) values.push_back(of(row));
   return values;
 }
