@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "studies/study.hpp"
-#include "commands/common_options.hpp"
-#include "json.hpp"
 
 #include <fmt/format.h>
-
 #include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <string>
 #include <vector>
 
 #include "commands/commands.hpp"
+#include "commands/common_options.hpp"
+#include "json.hpp"
 #include "report/page.hpp"
 
 namespace flexcomp::host {
