@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "flexcomp/bounds.hpp"
 #include "flexcomp/detail/damped_jacobian_solver.hpp"
@@ -30,7 +31,10 @@ namespace flexcomp {
 template <class S, std::size_t N>
 struct Compensated {
   std::array<S, N> q;                       ///< corrected joint command, rad
-  StepStatus status = StepStatus::refused;  ///< how it came about
+  StepStatus status = StepStatus::refused;  ///< summary of the flags
+  std::uint16_t flags = 0;                  ///< what held it back, bits of step_flag
+  S remaining_position_m = S(0);            ///< error of position that the last iterate shows
+  S remaining_orientation_rad = S(0);       ///< the same of orientation
 };
 
 namespace detail {

@@ -61,6 +61,40 @@ inline const char* name(StepStatus s) {
   return "unknown";
 }
 
+/// What holds a step back (docs/compensation.md, section 8), as bits; 0 where nothing does. Numbers are on the wire:
+/// add, never change.
+namespace step_flag {
+constexpr std::uint16_t refused = 1U << 0U;       ///< the command or its context was not used
+constexpr std::uint16_t no_set = 1U << 1U;        ///< no valid parameter set
+constexpr std::uint16_t at_limit = 1U << 2U;      ///< a corrected joint is at its limit
+constexpr std::uint16_t limited = 1U << 3U;       ///< the correction was scaled to the largest one allowed
+constexpr std::uint16_t rate_limited = 1U << 4U;  ///< the correction follows at its greatest rate
+constexpr std::uint16_t settling = 1U << 5U;  ///< the difference that an event left has not returned to 0 yet
+constexpr std::uint16_t not_converged = 1U << 6U;  ///< the last iterate was still above its tolerance
+constexpr std::uint16_t near_singular = 1U << 7U;  ///< damped or scaled near a singularity (C9, C10)
+constexpr unsigned count = 8;                      ///< bits that have a meaning
+}  // namespace step_flag
+
+/// The summary of a set of flags: the first that holds of refused, no_set, at_limit, limited (also for rate_limited,
+/// settling, not_converged), near_singular, ok.
+constexpr StepStatus summary(std::uint16_t flags) {
+  if ((flags & step_flag::refused) != 0) return StepStatus::refused;
+  if ((flags & step_flag::no_set) != 0) return StepStatus::no_set;
+  if ((flags & step_flag::at_limit) != 0) return StepStatus::at_limit;
+  constexpr unsigned held_back =
+      step_flag::limited | step_flag::rate_limited | step_flag::settling | step_flag::not_converged;
+  if ((flags & held_back) != 0) return StepStatus::limited;
+  return (flags & step_flag::near_singular) != 0 ? StepStatus::near_singular : StepStatus::ok;
+}
+
+/// Word of the flag of bit `bit` as in files, lower case (`rate_limited`).
+inline const char* flag_name(unsigned bit) {
+  constexpr const char* words[step_flag::count] = {"refused",       "no_set",       "at_limit",
+                                                   "limited",       "rate_limited", "settling",
+                                                   "not_converged", "near_singular"};
+  return bit < step_flag::count ? words[bit] : "unknown";
+}
+
 /// Message in English, lower case, without a full stop.
 inline const char* text(Refusal r) {
   switch (r) {
