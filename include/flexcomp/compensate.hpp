@@ -3,10 +3,9 @@
 /// Inverse compensation (docs/compensation.md): the joint command that brings the flexible arm to the nominal
 /// pose of the command.
 ///
-/// A set whose effects all turn joints (Model::has_only_joint_deflections(); every set of the paper's model)
-/// takes the joint-only path: rigid inverse kinematics first, then the deflections. All other sets take the
-/// general path, three corrections with the forward model. Work is bounded on any input. Near a singularity
-/// the error that remains is in the orientation (detail/damped_jacobian_solver.hpp).
+/// One algorithm for every set (detail/correction.hpp): rigid inverse kinematics first, then the effects by fixed point.
+/// Work is bounded on any input. Near a singularity the error that remains is in the orientation
+/// (detail/damped_jacobian_solver.hpp).
 ///
 /// The correction is continuous in the command but for what one step more or less of an iteration changes:
 /// 1e-9 rad where the arm is regular. tests/core/compensation_test.cpp bounds its slope through the singularities.
@@ -19,10 +18,7 @@
 #include <cstdint>
 
 #include "flexcomp/bounds.hpp"
-#include "flexcomp/detail/damped_jacobian_solver.hpp"
-#include "flexcomp/detail/general_path.hpp"
-#include "flexcomp/detail/joint_only_path.hpp"
-#include "flexcomp/detail/rigid_chain.hpp"
+#include "flexcomp/detail/correction.hpp"
 #include "flexcomp/forward.hpp"
 
 namespace flexcomp {
@@ -69,7 +65,9 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
                        Compensated<S, N>& out) {
   const auto refuse = [&out, &q_command] {
     out.q = q_command;
+    out.flags = step_flag::refused;
     out.status = StepStatus::refused;
+    out.remaining_position_m = out.remaining_orientation_rad = S(0);
   };
   for (std::size_t i = 0; i < N; ++i) {
     if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return refuse();
@@ -77,22 +75,11 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   // Checked here because a grid is constant outside its nodes, where a NaN would not show.
   if (!detail::is_finite_context(context)) return refuse();
   const S largest = settings.largest_correction_rad;
-  std::array<SinCos<S>, N> angle;
-  detail::sin_cos_all(q_command, model.nominals(), angle);
-  detail::DampedJacobianSolver<S, N> solver;
-  detail::FlangeTarget<S> target;
-  detail::rigid_pass(model.nominals(), angle, solver.joints(), target.flange);
-  detail::flange_point(target.flange, vec3<S>(model.nominal_tool().position), target.tool_point);
-  solver.set(target.tool_point, settings);
+  detail::Correction<S, N, Cap> correction(model, context, settings);
   std::array<S, N> q;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
-  if (model.has_only_joint_deflections()) {
-    detail::correct_joint_deflections(model, target, context, angle, solver, settings, q);
-  } else {
-    const Pose<S> target = nominal_forward(model, q_command);
-    detail::correct_general(model, target, context, settings, solver, q);
-  }
+  correction.run(q);
   // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);
   FLEXCOMP_UNROLL
@@ -101,20 +88,34 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
     square += change * change;
   }
   if (!(square < S(1e8))) return refuse();
-  out.status = solver.is_damped() ? StepStatus::near_singular : StepStatus::ok;
+  unsigned flags = correction.is_damped() ? step_flag::near_singular : 0U;
+  if (!correction.has_converged()) flags |= step_flag::not_converged;
+  // What limits cut off of the joints: at most as much turn of the tool, and as much at the arm's reach of its position.
+  S cut = S(0);
   if (square > largest * largest) {
     std::array<S, N> change;
     for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
     if (scale_to_limit(change, largest)) {
-      out.status = StepStatus::limited;
-      for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i] + change[i];
+      flags |= step_flag::limited;
+      for (std::size_t i = 0; i < N; ++i) {
+        const S x = q_command[i] + change[i];
+        cut += q[i] < x ? x - q[i] : q[i] - x;
+        q[i] = x;
+      }
     }
   }
   for (std::size_t i = 0; i < N; ++i) {
     S x = q[i];
-    if (clamp_to(x, model.lower(i), model.upper(i))) out.status = StepStatus::at_limit;
+    if (clamp_to(x, model.lower(i), model.upper(i))) {
+      flags |= step_flag::at_limit;
+      cut += q[i] < x ? x - q[i] : q[i] - x;
+    }
     out.q[i] = x;
   }
+  out.flags = static_cast<std::uint16_t>(flags);
+  out.status = summary(out.flags);
+  out.remaining_position_m = correction.position_left() + cut * model.plan().reach();
+  out.remaining_orientation_rad = correction.orientation_left() + cut;
 }
 
 /// compensate() by value.

@@ -39,23 +39,6 @@ struct Load {
   Vector3<S> moment;  ///< N·m
 };
 
-/// Sum of all effects at each slot (M5), on top of the constant values; m and rad.
-template <class S, std::size_t N>
-struct Slots {
-  std::array<std::array<S, 6>, N> link{};  ///< by link and slot
-  std::array<S, 6> base{};                 ///< by slot
-  std::array<S, 6> tool{};                 ///< by slot
-  std::array<S, 3> point{};                ///< by slot
-
-  /// Sets all to 0, in place: a temporary of this size does not fit on a controller's stack.
-  void clear() {
-    for (std::array<S, 6>& values : link) values.fill(S(0));
-    base.fill(S(0));
-    tool.fill(S(0));
-    point.fill(S(0));
-  }
-};
-
 /// Memory of one evaluation, and its intermediate results. The caller sets nothing in it.
 template <class S, std::size_t N = 6>
 struct Workspace {
@@ -207,7 +190,8 @@ inline S basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const C
     case Basis::base_moment_y:
       return detail::moment_about<S>(ws.load, Vector3<S>::UnitY(), Vector3<S>(S(0), S(0), term.argument));
     default: {
-      const S value = detail::plain_basis_value(model, term, context, ws.q);
+      detail::Wave<S> wave;
+      const S value = detail::plain_basis_value(model, term, context, ws.q, wave);
       return term.basis == Basis::curve && term.factor == Factor::load_torque ? value * torque() : value;
     }
   }

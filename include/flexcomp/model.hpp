@@ -10,9 +10,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <type_traits>
 
-#include "flexcomp/detail/effect_group.hpp"
+#include "flexcomp/detail/cycle_plan.hpp"
 #include "flexcomp/detail/link_shape.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
@@ -180,7 +179,7 @@ class Model {
     return Refusal::none;
   }
 
-  /// Adds up the constant terms and sorts the effects. Called once, after the last add().
+  /// Adds up the constant terms and plans the control cycle. Called once, after the last add().
   void finish() {
     for (std::size_t i = 0; i < N; ++i) {
       shape_[i] = nominal_[i];
@@ -194,8 +193,7 @@ class Model {
     }
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
-    sort_effects();
-    compute_twists();
+    plan_.set(*this);
   }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
@@ -241,127 +239,23 @@ class Model {
   /// Values of a table.
   const S* values(const Table& table) const { return values_.data() + table.offset; }
 
-  // --- for the control cycle: effects by group (detail/effect_group.hpp) ---------------------------------
-
   const std::array<LinkShape<S>, N>& nominals() const { return nominal_; }  ///< links without terms
   const std::array<LinkShape<S>, N>& shapes() const { return shape_; }  ///< links with their constant terms
-  /// True where every effect turns a joint (slot theta of a link) by load torque, link weight, or something
-  /// that needs no frames. The arm is then a rigid chain with compliant joints (docs/compensation.md, C2).
-  bool has_only_joint_deflections() const { return only_joint_deflections_; }
-  /// True where some effect follows load torque or link weight.
-  bool has_load_deflections() const { return has_load_deflections_; }
-  /// Compliance of joint i (from 0) to its own load torque (M12), rad/(N·m); the sum of all such terms.
-  S compliance(std::size_t i) const { return compliance_[i]; }
-  /// Number of link-weight terms.
-  std::size_t lever_count() const { return group_end_[detail::group::lever]; }
-  /// Link-weight term k; equal levers are adjacent.
-  const Term<S>& lever_term(std::size_t k) const { return effects_[order_[k]]; }
-  /// Number of terms of load torque other than compliances.
-  std::size_t other_loaded_count() const {
-    return group_end_[detail::group::other_loaded] - group_end_[detail::group::lever];
-  }
-  /// Term k of them.
-  const Term<S>& other_loaded_term(std::size_t k) const {
-    return effects_[order_[group_end_[detail::group::lever] + k]];
-  }
-  /// Number of terms that are functions of the reading of the joint that they turn: curves, harmonics, scale.
-  std::size_t own_count() const {
-    return group_end_[detail::group::own] - group_end_[detail::group::other_loaded];
-  }
-  /// Term k of them.
-  const Term<S>& own_term(std::size_t k) const {
-    return effects_[order_[group_end_[detail::group::other_loaded] + k]];
-  }
-  /// Number of terms of other readings and of the context.
-  std::size_t other_count() const {
-    return group_end_[detail::group::other] - group_end_[detail::group::own];
-  }
-  /// Term k of them.
-  const Term<S>& other_term(std::size_t k) const {
-    return effects_[order_[group_end_[detail::group::own] + k]];
-  }
-  bool has_axial_gravity() const { return axial_gravity_; }  ///< along z of F0
-  S inverse_gravity() const { return inverse_gravity_; }     ///< s^2/m; 0 without gravity
-  bool turns_tool() const { return turns_tool_; }            ///< by constant terms or effects
-  /// Nominal tool rotation times the inverse of the one with constant terms.
-  const Matrix3<S>& tool_turn() const { return tool_turn_; }
-  /// Motion by the constant terms of link i (from 0), in the frame after it and to first order (C3); the last
-  /// one includes those of the tool.
-  const SmallMotion<S>& link_twist(std::size_t i) const { return link_twist_[i]; }
+  bool has_axial_gravity() const { return axial_gravity_; }             ///< along z of F0
   /// Constant part of the offset of joint i, rad.
   S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }
-  /// Motion by B, in Fb at its origin, to first order (C3).
-  const SmallMotion<S>& base_twist() const { return base_twist_; }
+  /// What the control cycle needs beside the chain.
+  const detail::CyclePlan<S, N, Cap>& plan() const { return plan_; }
+  /// Effect k of one of the plan's groups (detail::group).
+  const Term<S>& effect_of(std::uint8_t group, std::size_t k) const {
+    return effects_[plan_.index(group, k)];
+  }
 
  private:
   bool reads_direction(const Term<S>& t) const {
     if (t.basis == Basis::direction) return true;
     return t.basis == Basis::grid && (tables_[t.table].row_covariate == Covariate::direction ||
                                       tables_[t.table].column_covariate == Covariate::direction);
-  }
-
-  using Count = std::conditional_t<Cap::terms <= 255, std::uint8_t, std::uint16_t>;
-
-  void sort_effects() {
-    only_joint_deflections_ = true;
-    for (S& c : compliance_) c = S(0);
-    std::array<std::uint8_t, Cap::terms> group{};
-    bool has_compliance = false;
-    for (std::size_t k = 0; k < effect_count_; ++k) {
-      const Term<S>& t = effects_[k];
-      group[k] = detail::effect_group<N>(t, only_joint_deflections_);
-      if (group[k] != detail::group::own_compliance) continue;
-      compliance_[t.joint] += t.coefficient;
-      has_compliance = true;
-    }
-    std::size_t n = 0;
-    for (std::uint8_t g = 0; g < detail::group::count; ++g) {
-      for (std::size_t k = 0; k < effect_count_; ++k) {
-        if (group[k] != g) continue;
-        std::size_t at = n++;
-        // Equal levers side by side, so that each is taken once.
-        if (g == detail::group::lever) {
-          for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at)
-            order_[at] = order_[at - 1];
-        }
-        order_[at] = static_cast<Count>(k);
-      }
-      group_end_[g] = static_cast<Count>(n);
-    }
-    has_load_deflections_ =
-        has_compliance || group_end_[detail::group::other_loaded] != 0;  // the end includes the levers
-    const S g2 = dot<S>(gravity_, gravity_);
-    using std::sqrt;
-    inverse_gravity_ = g2 > S(0) ? S(1) / sqrt(g2) : S(0);
-    turns_tool_ =
-        tool_moves_ || !is_zero(tool_[slot::rx]) || !is_zero(tool_[slot::ry]) || !is_zero(tool_[slot::rz]);
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) {
-        tool_turn_(r, c) = nominal_tool_.rotation(r, 0) * tool_pose_.rotation(c, 0) +
-                           nominal_tool_.rotation(r, 1) * tool_pose_.rotation(c, 1) +
-                           nominal_tool_.rotation(r, 2) * tool_pose_.rotation(c, 2);
-      }
-    }
-  }
-  void compute_twists() {
-    for (std::size_t i = 0; i < N; ++i) {
-      const SinCos<S> none = {S(0), S(1)};
-      link_twist_[i] = twist_between(link_at_zero(nominal_[i], none),
-                                     link_at_zero(shape_[i], sin_cos(constant_[i][slot::theta])));
-    }
-    // The motion of the tool is given in the flange frame, as that of the last link.
-    const SmallMotion<S> tool = twist_between(nominal_tool_, tool_pose_);
-    const Mat3<S> turned = columns_of(nominal_tool_.rotation);
-    const Vec3<S> angular = combine(turned, tool.angular);
-    SmallMotion<S>& last = link_twist_[N - 1];
-    last.linear =
-        last.linear + combine(turned, tool.linear) + cross(vec3<S>(nominal_tool_.position), angular);
-    last.angular = last.angular + angular;
-    base_twist_ = twist_between(Pose<S>(), base_pose_);
-  }
-
-  static bool comes_before(const Term<S>& a, const Term<S>& b) {
-    return a.joint != b.joint ? a.joint < b.joint : a.distal_joint < b.distal_joint;
   }
 
   static bool is_zero(double v) { return bits_of(v) << 1U == 0; }
@@ -392,16 +286,7 @@ class Model {
   bool reads_direction_ = false;
   bool axial_gravity_ = true;
   std::array<std::uint8_t, N> link_moves_{};
-  bool only_joint_deflections_ = true;
-  bool has_load_deflections_ = false;
-  bool turns_tool_ = false;
-  std::array<S, N> compliance_{};
-  S inverse_gravity_ = S(0);
-  std::array<SmallMotion<S>, N> link_twist_{};
-  SmallMotion<S> base_twist_{};
-  Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
-  std::array<Count, detail::group::count> group_end_{};
-  std::array<Count, Cap::terms> order_{};
+  detail::CyclePlan<S, N, Cap> plan_{};
   std::size_t effect_count_ = 0;
   std::size_t table_count_ = 0;
   std::size_t value_count_ = 0;

@@ -19,7 +19,7 @@ int main() {
   flexcomp_settings settings;
   flexcomp_settings_default(&settings);
   settings.fade_cycles = 1;  // budget_parts measures what fading costs
-  flexcomp_arm* arm = budget::start(memory, storage, 0, &settings);
+  flexcomp_arm* arm = budget::start(memory, storage, budget::Set::paper, &settings);
   if (arm == nullptr) return 1;
   nominal.begin(selftest::tx60l());
   nominal.finish();

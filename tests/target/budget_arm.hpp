@@ -31,9 +31,54 @@ inline flexcomp_storage_result write(void*, unsigned, std::uint32_t, const std::
   return FLEXCOMP_STORAGE_FAILED;
 }
 
-/// The paper's terms, then a curve on each of the first `curves` joints.
-inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t size) {
-  static std::array<flexcomp::Term<Scalar>, paper_terms + 6> terms;
+/// Effects of eleven kinds beside the geometry: with the paper's compliance and link weight nine more, 27 terms of which
+/// eleven move links or the base.
+inline std::size_t add_eleven_kinds(flexcomp::Term<Scalar>* to) {
+  using flexcomp::Basis;
+  namespace slot = flexcomp::slot;
+  std::size_t count = 0;
+  const auto add = [&](std::uint8_t body, std::uint8_t slot, Basis basis, float coefficient,
+                       std::uint8_t joint, float argument = 0) {
+    flexcomp::Term<Scalar>& t = to[count++];
+    t = {};
+    t.place = {body, slot};
+    t.basis = basis;
+    t.joint = joint;
+    t.argument = Scalar(argument);
+    t.coefficient = Scalar(coefficient);
+  };
+  for (const std::uint8_t j : {std::uint8_t{1}, std::uint8_t{2}}) {
+    const auto link = static_cast<std::uint8_t>(j + 1);
+    add(link, slot::theta, Basis::load_torque_cubed, 1e-8F, j);
+    add(link, slot::theta, Basis::sine, 1e-4F, j, 1);
+    add(link, slot::theta, Basis::cosine, 1e-4F, j, 1);
+    add(link, slot::theta, Basis::direction, 5e-5F, j);
+    add(link, slot::theta, Basis::joint_position, 1e-4F, j);
+  }
+  for (const std::uint8_t j : {std::uint8_t{0}, std::uint8_t{3}, std::uint8_t{5}})
+    add(static_cast<std::uint8_t>(j + 1), slot::theta, Basis::sine, 1e-4F, j, 2);
+  for (const std::uint8_t j : {std::uint8_t{3}, std::uint8_t{4}})
+    add(6, slot::theta, Basis::joint_position, 1e-4F, j);  // coupling
+  for (const std::uint8_t j : {std::uint8_t{1}, std::uint8_t{4}}) {
+    const auto link = static_cast<std::uint8_t>(j + 1);
+    add(link, slot::alpha, Basis::sine, 1e-4F, j, 1);
+    add(link, slot::gamma, Basis::cosine, 1e-4F, j, 1);
+  }
+  add(2, slot::alpha, Basis::load_moment_x, 2e-6F, 1);
+  add(3, slot::beta, Basis::load_moment_y, 2e-6F, 2);
+  add(2, slot::a, Basis::thermal, 12e-6F, 1);
+  add(3, slot::d, Basis::thermal, 12e-6F, 2);
+  add(4, slot::d, Basis::thermal, 12e-6F, 3);
+  add(0, slot::rx, Basis::base_moment_x, 1e-6F, 0, -0.3F);
+  add(0, slot::ry, Basis::base_moment_y, 1e-6F, 0, -0.3F);
+  return count;
+}
+
+/// The sets that are measured: the paper's terms alone, with a curve on every joint, with effects of eleven kinds.
+enum class Set { paper, curves, eleven_kinds };
+
+inline std::size_t make_image(Set set, std::uint8_t* out, std::size_t size) {
+  static std::array<flexcomp::Term<Scalar>, paper_terms + 28> terms;
   static std::array<flexcomp::Table, 6> tables;
   static std::array<Scalar, 6 * curve_values> values;
   for (std::size_t k = 0; k < paper_terms; ++k) terms[k] = selftest::make_term<Scalar>(selftest::entries[k]);
@@ -42,6 +87,7 @@ inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t
     state = state * 1664525U + 1013904223U;
     v = static_cast<Scalar>(static_cast<std::int32_t>(state >> 8U) - (1 << 23)) * Scalar(3e-4F / (1 << 23));
   }
+  const std::size_t curves = set == Set::curves ? 6 : set == Set::eleven_kinds ? 1 : 0;
   for (std::size_t j = 0; j < curves; ++j) {
     flexcomp::Term<Scalar>& t = terms[paper_terms + j];
     t = {};
@@ -53,8 +99,10 @@ inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t
     tables[j].offset = static_cast<std::uint16_t>(j * curve_values);
     tables[j].size = curve_values;
   }
-  const flexcomp::TermList<Scalar> list{terms.data(), paper_terms + curves, tables.data(),
-                                        curves,       values.data(),        curves * curve_values};
+  std::size_t count = paper_terms + curves;
+  if (set == Set::eleven_kinds) count += add_eleven_kinds(terms.data() + count);
+  const flexcomp::TermList<Scalar> list{terms.data(), count,         tables.data(),
+                                        curves,       values.data(), curves * curve_values};
   const flexcomp::NominalRobot<6> robot = selftest::tx60l();
   flexcomp::ImageHeader header;
   header.sequence = 1;
@@ -64,8 +112,8 @@ inline std::size_t make_image(std::size_t curves, std::uint8_t* out, std::size_t
 }
 
 /// Writes the image and its seal (firmware/include/flexcomp_firmware/store.hpp). False where it does not fit.
-inline bool store_image(std::size_t curves, Storage& storage) {
-  const std::size_t size = make_image(curves, storage.bytes, FLEXCOMP_STAGING_BYTES);
+inline bool store_image(Set set, Storage& storage) {
+  const std::size_t size = make_image(set, storage.bytes, FLEXCOMP_STAGING_BYTES);
   if (size == 0) return false;
   std::uint8_t* seal = storage.bytes + FLEXCOMP_SLOT_BYTES - 32;
   std::memset(seal, 0, 32);
@@ -97,12 +145,12 @@ inline flexcomp_robot c_robot() {
   return c;
 }
 
-/// Starts an arm with this many curves; null where its set did not become active.
-inline flexcomp_arm* start(flexcomp_memory& memory, Storage& storage, std::size_t curves,
+/// Starts an arm with this set; null where its set did not become active.
+inline flexcomp_arm* start(flexcomp_memory& memory, Storage& storage, Set set,
                            const flexcomp_settings* settings) {
   const flexcomp_robot robot = c_robot();
   const flexcomp_storage hooks = {&storage, read, erase, write};
-  if (!store_image(curves, storage)) return nullptr;
+  if (!store_image(set, storage)) return nullptr;
   flexcomp_arm* arm = flexcomp_init(&memory, sizeof memory, &robot, settings, &hooks);
   if (arm == nullptr || flexcomp_boot(arm) != 0) return nullptr;
   return arm;

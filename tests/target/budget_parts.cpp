@@ -24,13 +24,19 @@ struct Counts {
   std::uint32_t least = ~0U, most = 0, sum = 0;
 };
 
-/// Steps at random commands, each from a cold start; false where one was not corrected.
-bool steps(flexcomp_arm* arm, Counts& counts) {
+flexcomp::Model<Scalar, 6, flexcomp::Capacity<1, 1, 6>> nominal;
+
+/// Steps at random commands, or at such where the arm is regular, each from a cold start; false where one was not
+/// corrected.
+bool steps(flexcomp_arm* arm, Counts& counts, bool regular = false) {
   budget::Commands commands(1);
   counts = {};
   for (std::uint32_t k = 0; k < calls; ++k) {
-    Scalar q[6];
-    commands.next(q);
+    std::array<Scalar, 6> command;
+    do {
+      commands.next(command.data());
+    } while (regular && !budget::is_regular(nominal, command));
+    Scalar* const q = command.data();
     const std::uint32_t from = ticks();
     const flexcomp_status status = flexcomp_step(arm, q, nullptr, q);
     const std::uint32_t count = instructions(from + own, ticks());
@@ -42,11 +48,11 @@ bool steps(flexcomp_arm* arm, Counts& counts) {
   return true;
 }
 
-flexcomp_arm* arm_with(std::size_t curves, std::uint32_t fade_cycles) {
+flexcomp_arm* arm_with(budget::Set set, std::uint32_t fade_cycles) {
   flexcomp_settings settings;
   flexcomp_settings_default(&settings);
   settings.fade_cycles = fade_cycles;
-  return budget::start(memory, storage, curves, &settings);
+  return budget::start(memory, storage, set, &settings);
 }
 
 /// What the same run's answers leave at the regular poses, and what a step takes there.
@@ -141,12 +147,16 @@ int main() {
   flexcomp::boards::start_instruction_counter();
   const std::uint32_t from = ticks();
   own = ticks() - from;
-  Counts plain, fading, curves;
-  flexcomp_arm* arm = arm_with(0, 1000);
+  nominal.begin(selftest::tx60l());
+  nominal.finish();
+  Counts plain, fading, curves, eleven;
+  flexcomp_arm* arm = arm_with(budget::Set::paper, 1000);
   if (arm == nullptr || !steps(arm, fading)) return 1;
-  arm = arm_with(6, 1);
+  arm = arm_with(budget::Set::curves, 1);
   if (arm == nullptr || !steps(arm, curves)) return 2;
-  arm = arm_with(0, 1);
+  arm = arm_with(budget::Set::eleven_kinds, 1);
+  if (arm == nullptr || !steps(arm, eleven, true)) return 7;
+  arm = arm_with(budget::Set::paper, 1);
   if (arm == nullptr || !steps(arm, plain)) return 3;
   print("step, 39 terms, least: ", plain.least, "\n");
   print("step, 39 terms, mean: ", plain.sum / calls, "\n");
@@ -154,6 +164,8 @@ int main() {
   print("step, 39 terms, fading in, mean: ", fading.sum / calls, "\n");
   print("step, 39 terms and 6 curves, mean: ", curves.sum / calls, "\n");
   print("a joint curve: ", (curves.sum - plain.sum) / calls / 6U, "\n");
+  print("step, eleven kinds of effect, regular poses, mean: ", eleven.sum / calls, "\n");
+  print("step, eleven kinds of effect, regular poses, most: ", eleven.most, "\n");
   if (!regular_poses(arm)) return 4;
   image_check();
   if (!sdo_request(arm)) return 5;

@@ -59,6 +59,60 @@ inline CurveWeights<S> curve_weights(const S& q, std::uint16_t m) {
   return r;
 }
 
+/// Second-order Taylor expansion of a function of a joint's reading: value, slope per rad and half the second
+/// derivative.
+template <class S>
+struct Expansion {
+  S value, slope, half_curvature;
+};
+
+/// Adds k times the spline (M6) at the reading q (rad): the cubic of its cell in powers of the distance to
+/// the cell's start.
+template <class S, std::size_t N, class Cap>
+FLEXCOMP_ONCE void expand_curve(const Model<S, N, Cap>& model, const Term<S>& term, const S& q, const S& k,
+                                Expansion<S>& sum) {
+  const Table& table = model.table(term.table);
+  const std::int32_t m = table.size;
+  const S per_rad = S(static_cast<float>(table.size)) * S(0.15915494309189533577);
+  const S t = q * per_rad;
+  std::int32_t cell = 0;
+  // As in curve_weights(): far inside 32 bits, and a NaN gives cell 0.
+  if (t * t < S(1e14F)) cell = truncate(t);
+  S u = t - S(static_cast<float>(cell));
+  if (u < S(0)) {
+    u += S(1);
+    --cell;
+  }
+  std::int32_t first = (cell - 1) % m;
+  if (first < 0) first += m;
+  const S* from = model.values(table) + first;
+  S c0 = from[0], c1, c2, c3;
+  if (first + 3 < m) {
+    c1 = from[1];
+    c2 = from[2];
+    c3 = from[3];
+  } else {
+    c1 = from[first + 1 < m ? 1 : 1 - m];
+    c2 = from[first + 2 < m ? 2 : 2 - m];
+    c3 = from[3 - m];
+  }
+  // p0 + p1 u + p2 u^2 + p3 u^3
+  S p3 = (c1 - c2) * S(0.5);
+  p3 += (c3 - c0) * S(1.0 / 6);
+  S p2 = (c0 + c2) * S(0.5);
+  p2 -= c1;
+  const S p1 = (c2 - c0) * S(0.5);
+  S p0 = p2 * S(1.0 / 3);
+  p0 += c1;
+  const S bend = u * p3;
+  const S half = p2 + bend + bend + bend;  // of the second derivative
+  const S value = p1 + u * (p2 + bend);
+  sum.value += k * (p0 + u * value);
+  const S scale = k * per_rad;
+  sum.slope += scale * (p1 + u * (p2 + half));
+  sum.half_curvature += scale * per_rad * half;
+}
+
 /// Value of a covariate of a grid (M7), in its unit.
 template <class S, std::size_t N>
 FLEXCOMP_ONCE S covariate(Covariate kind, std::size_t joint, const std::array<S, N>& q,
@@ -107,11 +161,31 @@ inline S bilinear(const S* v, std::size_t columns, const Cell<S>& row, const Cel
   return upper + (lower - upper) * row.fraction;
 }
 
+/// Sine and cosine of order x reading, kept for the next term: harmonics come in pairs.
+template <class S>
+class Wave {
+ public:
+  /// Of the joint's reading q, rad: the same for all calls with that joint.
+  const SinCos<S>& at(std::uint8_t joint, const S& order, const S& q) {
+    if (joint != joint_ || order < order_ || order > order_) {
+      joint_ = joint;
+      order_ = order;
+      value_ = sin_cos(order * q);
+    }
+    return value_;
+  }
+
+ private:
+  std::uint8_t joint_ = 0xFF;
+  S order_ = S(0);
+  SinCos<S> value_{S(0), S(1)};
+};
+
 /// Basis (M5) of a term that needs neither frames nor loads, at the readings q (rad). A curve's factor of
 /// torque is left to the caller.
 template <class S, std::size_t N, class Cap>
 inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, const Context<S, N>& context,
-                           const std::array<S, N>& q) {
+                           const std::array<S, N>& q, Wave<S>& wave) {
   const std::size_t j = term.joint;
   switch (term.basis) {
     case Basis::one:
@@ -119,9 +193,9 @@ inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, c
     case Basis::joint_position:
       return q[j];
     case Basis::sine:
-      return sin_cos(term.argument * q[j]).s;
+      return wave.at(term.joint, term.argument, q[j]).s;
     case Basis::cosine:
-      return sin_cos(term.argument * q[j]).c;
+      return wave.at(term.joint, term.argument, q[j]).c;
     case Basis::direction:
       return -context.direction[j];
     case Basis::relative_speed:
@@ -134,11 +208,9 @@ inline S plain_basis_value(const Model<S, N, Cap>& model, const Term<S>& term, c
     case Basis::time:
       return context.time_s;
     case Basis::curve: {
-      const Table& table = model.table(term.table);
-      const S* c = model.values(table);
-      const CurveWeights<S> b = curve_weights(q[j], table.size);
-      const S value =
-          c[b.index[0]] * b.w[0] + c[b.index[1]] * b.w[1] + c[b.index[2]] * b.w[2] + c[b.index[3]] * b.w[3];
+      Expansion<S> at = {S(0), S(0), S(0)};
+      expand_curve(model, term, q[j], S(1), at);
+      const S value = at.value;
       if (term.factor == Factor::temperature)
         return value * (context.temperature_c - model.reference_temperature());
       if (term.factor == Factor::payload) return value * context.payload_kg;

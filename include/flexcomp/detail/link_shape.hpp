@@ -6,6 +6,7 @@
 #define FLEXCOMP_DETAIL_LINK_SHAPE_HPP
 
 #include <array>
+#include <cstddef>
 
 #include "flexcomp/linear.hpp"
 #include "flexcomp/term.hpp"
@@ -22,6 +23,35 @@ struct LinkShape {
   S d = S(0);                    ///< m
   S a = S(0);                    ///< m
   bool has_beta = false;         ///< false: Rot(y,beta) is left out
+};
+
+/// Sum of all effects at each slot (M5), on top of the constant values; m and rad.
+template <class S, std::size_t N>
+struct Slots {
+  std::array<std::array<S, 6>, N> link;  ///< by link and slot
+  std::array<S, 6> base;                 ///< by slot
+  std::array<S, 6> tool;                 ///< by slot
+  std::array<S, 3> point;                ///< by slot
+
+  /// Sets all to 0. They are not set before: where no effect moves a link it would cost a cycle more than it gives.
+  void clear() {
+    for (std::array<S, 6>& values : link) values.fill(S(0));
+    base.fill(S(0));
+    tool.fill(S(0));
+    point.fill(S(0));
+  }
+};
+
+/// Link whose slots effects have moved: gamma as well, Rot(z) Trans(z,d) Trans(x,a) Rot(y,gamma) Rot(x,alpha)
+/// Rot(y,beta).
+template <class S>
+struct MovedLink {
+  SinCos<S> gamma;  ///< of gamma
+  SinCos<S> alpha;  ///< of alpha
+  SinCos<S> beta;   ///< of beta
+  S d;              ///< m
+  S a;              ///< m
+  bool has_beta;    ///< false: Rot(y,beta) is left out
 };
 
 /// Small rigid motion (M17): of the point at the origin of its frame, and about it.

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
 
 #include "flexcomp/model.hpp"
 #include "flexcomp/trigonometry.hpp"
@@ -30,23 +31,41 @@ struct FlangePose {
 };
 
 /// Forward kinematics of a rigid chain (M2): axes and origins of its joints, and its flange, in F0. `angle`
-/// holds sines and cosines of readings plus offsets. Work: at most 30 multiplications per link.
-template <class S, std::size_t N>
-inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::array<SinCos<S>, N>& angle,
-                       std::array<JointAxis<S>, N>& joints, FlangePose<S>& flange) {
+/// holds sines and cosines of readings plus offsets; Link is LinkShape or MovedLink. Work: at most 34 multiplications
+/// per link.
+template <class S, std::size_t N, class Link>
+FLEXCOMP_ONCE void rigid_pass(const std::array<Link, N>& links, const std::array<SinCos<S>, N>& angle,
+                              std::array<JointAxis<S>, N>& joints, FlangePose<S>& flange) {
+  constexpr bool may_tilt = std::is_same<Link, MovedLink<S>>::value;
   // The first link starts from the axes of F0: most products are by 0 or 1.
-  const LinkShape<S>& first = links[0];
+  const Link& first = links[0];
   joints[0] = {{S(0), S(0), S(1)}, {S(0), S(0), S(0)}};
   S xx = angle[0].c, xy = angle[0].s, xz = S(0);
   S px = first.a * xx, py = first.a * xy, pz = first.d;
   S yz = first.alpha.s, zz = first.alpha.c;
   S yx = -xy * zz, yy = xx * zz;
   S zx = xy * yz, zy = -xx * yz;
+  if constexpr (may_tilt) {
+    const S cg = first.gamma.c, sg = first.gamma.s;
+    // z of the tilted frame is (sg x, cg z), and x is (cg x, -sg z).
+    const S sa = yz, ca = zz;
+    const S ux = sg * xx, uy = sg * xy;
+    yx += sa * ux;
+    yy += sa * uy;
+    yz = sa * cg;
+    zx += ca * ux;
+    zy += ca * uy;
+    zz = ca * cg;
+    xx = cg * xx;
+    xy = cg * xy;
+    xz = -sg;
+  }
   if (first.has_beta) {
     const S cb = first.beta.c, sb = first.beta.s;
-    xz = -sb * zz;
-    zz = cb * zz;
-    S t = xx;
+    S t = xz;
+    xz = cb * xz - sb * zz;
+    zz = cb * zz + sb * t;
+    t = xx;
     xx = cb * xx - sb * zx;
     zx = cb * zx + sb * t;
     t = xy;
@@ -54,7 +73,7 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
     zy = cb * zy + sb * t;
   }
   for (std::size_t i = 1; i < N; ++i) {
-    const LinkShape<S>& link = links[i];
+    const Link& link = links[i];
     JointAxis<S>& joint = joints[i];
     joint.axis.x = zx;
     joint.axis.y = zy;
@@ -78,6 +97,18 @@ inline void rigid_pass(const std::array<LinkShape<S>, N>& links, const std::arra
     py += link.a * xy;
     pz += link.d * zz;
     pz += link.a * xz;
+    if constexpr (may_tilt) {
+      const S cg = link.gamma.c, sg = link.gamma.s;
+      t = xx;
+      xx = cg * xx - sg * zx;
+      zx = cg * zx + sg * t;
+      t = xy;
+      xy = cg * xy - sg * zy;
+      zy = cg * zy + sg * t;
+      t = xz;
+      xz = cg * xz - sg * zz;
+      zz = cg * zz + sg * t;
+    }
     const S ca = link.alpha.c, sa = link.alpha.s;
     t = yx;
     yx = ca * yx + sa * zx;
@@ -114,7 +145,7 @@ inline void constant_twist(const Model<S, N, Cap>& model, const std::array<SinCo
   S wx = S(0), wy = S(0), wz = S(0);
   for (std::size_t i = N; i-- > 0;) {
     const LinkShape<S>& link = model.nominal(i);
-    const SmallMotion<S>& own = model.link_twist(i);
+    const SmallMotion<S>& own = model.plan().link_twist(i);
     vx += own.linear.x;
     vy += own.linear.y;
     vz += own.linear.z;
