@@ -54,15 +54,19 @@ inline bool is_finite_context(const Context<S, N>& c) {
 /// Inverse compensation (C1): the joint command `out.q` (rad) at which the arm with all its terms has the
 /// pose that the nominal arm has at q_command (rad).
 ///
-/// The result is a pure function of the arguments; work is bounded on any input (section 9 of
+/// The result is a pure function of the arguments; work is bounded on any input (section 10 of
 /// docs/compensation.md). Refused (command passed through): a command that is not finite or lies beyond a
 /// joint limit, a context that is not finite, and effects that grow beyond all bounds (a change of more than
 /// 1e4 rad, an overflow). Otherwise the result is finite, within the joint limits, and no joint differs from
 /// its command by more than settings.largest_correction_rad (C17).
+///
+/// Where `rate` is given (rad/s of the command in, of out.q out), its result is the derivative of out.q along the
+/// command's rate (C22), context and set standing still; where anything holds the step back (out.flags), it is the
+/// command's own.
 template <class S, std::size_t N, class Cap>
 inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
                        const Context<S, N>& context, const CompensationSettings<S>& settings,
-                       Compensated<S, N>& out) {
+                       Compensated<S, N>& out, std::array<S, N>* rate = nullptr) {
   const auto refuse = [&out, &q_command] {
     out.q = q_command;
     out.flags = step_flag::refused;
@@ -79,7 +83,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   std::array<S, N> q;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
-  correction.run(q);
+  correction.run(q, rate);
   // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);
   FLEXCOMP_UNROLL
@@ -116,6 +120,11 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   out.status = summary(out.flags);
   out.remaining_position_m = correction.position_left() + cut * model.plan().reach();
   out.remaining_orientation_rad = correction.orientation_left() + cut;
+  if (rate != nullptr && flags == 0) {
+    std::array<S, N> corrected;
+    correction.rate(q, corrected);
+    *rate = corrected;
+  }
 }
 
 /// compensate() by value.

@@ -31,6 +31,10 @@ constexpr int most_refinements = 3;
 /// Most fixed-point steps of the deflection (C15).
 constexpr int most_deflection_steps = 6;
 
+/// Rounds and refinements of the rate (C22).
+constexpr int rate_rounds = 4;
+constexpr int rate_refinements = 3;
+
 /// Ends of the iterations (C7).
 template <class S>
 struct Tolerance {
@@ -55,9 +59,10 @@ class Correction {
              const CompensationSettings<S>& settings)
       : model_(model), context_(context), settings_(settings) {}
 
-  /// Corrected command for the command q (rad), in place. Work: at most 9 chain passes, 2 factorisations, 20 linear
-  /// solutions and 7 evaluations of the effects.
-  void run(std::array<S, N>& q) {
+  /// Corrected command for the command q (rad), in place; rate() may follow where the rate of the command (rad/s) is
+  /// given. Work: at most 9 chain passes, 2 factorisations, 20 linear solutions and 7 evaluations of the effects.
+  void run(std::array<S, N>& q, const std::array<S, N>* command_rate = nullptr) {
+    command_rate_ = command_rate;
     undo_constant_terms(q);
     const CyclePlan<S, N, Cap>& plan = model_.plan();
     loaded_ = plan.needs_loads();
@@ -68,11 +73,65 @@ class Correction {
     for (std::size_t i = 0; i < N; ++i) deflection_[i] = S(0);
     if (moves_) evaluate(q, true);
     solve_chain(q, 1, most_corrections - 1);
+    FLEXCOMP_UNROLL
+    for (std::size_t i = 0; i < N; ++i) {
+      psi_[i] = q[i];
+      share_[i] = S(1);
+    }
     if (loaded_ || moves_ || plan.size(group::own) + plan.size(group::other) != 0) find_readings(q);
     using std::sqrt;
     const S joints = sqrt(joint_left_ * S(static_cast<float>(N)));
     position_left_ += joints * plan.reach();
     orientation_left_ += joints;
+  }
+
+  /// Rate of the readings (rad/s) for the command's rate (C22), the derivative of what run() gave as q where nothing was
+  /// given up; context and set stand still. Work: at most 9 chain
+  /// passes, 20 linear solutions, 8 evaluations of the effects.
+  void rate(const std::array<S, N>& q, std::array<S, N>& out) {
+    // J of the chain as it stands, linear in the rates.
+    std::array<S, N> turn;
+    for (std::size_t i = 0; i < N; ++i) turn[i] = psi_[i] - q[i] + ahead_[i];
+    rotate_all(angle_, turn, square_of(turn));
+    const std::array<SinCos<S>, N> chain = angle_;
+    FlangePose<S> flange;
+    Vec3<S> point;
+    pass(flange);
+    flange_point(flange, tool_point_, point);
+    const std::array<JointAxis<S>, N> joints = joints_;
+    const Mat3<S> b = model_.base_moves() ? moved_base_ : columns_of(model_.base_pose().rotation);
+    const auto into_base = [&b](const Vec3<S>& v) { return Vec3<S>{dot(b.a, v), dot(b.b, v), dot(b.c, v)}; };
+    const SmallMotion<S> target = {into_base(target_rate_.linear), into_base(target_rate_.angular)};
+    SmallMotion<S> rest = target;
+    // The slopes of the own deflections at the solution.
+    std::array<Expansion<S>, N> own;
+    own_deflections(model_, context_, q, own);
+    for (std::size_t i = 0; i < N; ++i) share_[i] = S(1) / (S(1) + own[i].slope);
+    const S without_limit = S(1e9F);
+    for (int round = 0;; ++round) {
+      std::array<S, N> psi_rate;
+      solver_.solve(rest.linear, rest.angular, without_limit, without_limit, psi_rate);
+      for (int n = 0; n < rate_refinements; ++n) {
+        SmallMotion<S> done;
+        linear_motion(joints, point, psi_rate, done);
+        std::array<S, N> more;
+        solver_.solve(rest.linear - done.linear, rest.angular - done.angular, without_limit, without_limit,
+                      more);
+        for (std::size_t i = 0; i < N; ++i) psi_rate[i] += more[i];
+      }
+      S square = S(0), changed = S(0);
+      for (std::size_t i = 0; i < N; ++i) {
+        const S v = (psi_rate[i] - effect_rate_[i]) * share_[i];
+        const S change = round == 0 ? v : v - out[i];
+        out[i] = v;
+        square += v * v;
+        changed += change * change;
+      }
+      // The remainder is smaller by the slope of the effects.
+      if (!(changed > S(1e-12F) * square) || round == rate_rounds) return;
+      rest = target;
+      effect_rates(q, out, chain, rest);
+    }
   }
 
   bool is_damped() const { return solver_.is_damped(); }    ///< near a singularity
@@ -86,6 +145,7 @@ class Correction {
     rigid_pass(model_.nominals(), angle_, solver_.joints(), nominal_);
     flange_point(nominal_, vec3<S>(model_.nominal_tool().position), nominal_point_);
     solver_.set(nominal_point_, settings_);
+    if (command_rate_ != nullptr) solver_.motion_by(*command_rate_, target_rate_);
     SmallMotion<S> move;
     constant_twist(model_, angle_, move);
     const SmallMotion<S>& base = model_.plan().base_twist();
@@ -172,6 +232,7 @@ class Correction {
       std::array<S, 6> six = model_.base();
       for (std::size_t k = 0; k < 6; ++k) six[k] += slots_.base[k];
       base = small_pose(six);
+      moved_base_ = columns_of(base.rotation);
     }
     if (model_.tool_moves() || model_.base_moves()) {
       set_target(model_.base_moves() ? base : model_.base_pose(),
@@ -271,6 +332,35 @@ class Correction {
     if (!moves_) deflection_ = deflection;
   }
 
+  /// Rates of the effects for rates of the readings, by central differences along them: deflections (rad/s) and, where
+  /// links move, what they add to the rate at which the chain (its angles in `chain`) has to follow its target.
+  FLEXCOMP_ONCE void effect_rates(const std::array<S, N>& q, const std::array<S, N>& q_rate,
+                                  const std::array<SinCos<S>, N>& chain, SmallMotion<S>& rest) {
+    const S greatest = greatest_of(q_rate);
+    if (!(greatest > S(0)) || !(loaded_ || moves_ || model_.plan().size(group::other) != 0)) return;
+    // A step of 0.3 mrad leaves 1e-8 of the slope of sines of some rad, and in float 1e-7 rad of rounding.
+    const S h = S(3e-4F) / greatest, half = S(0.5) / h;
+    for (int side = 0; side < 2; ++side) {
+      const S step = side == 0 ? -h : h, weight = side == 0 ? -half : half;
+      std::array<S, N> x;
+      for (std::size_t i = 0; i < N; ++i) x[i] = q[i] + step * q_rate[i];
+      sin_cos_all(x, model_.shapes(), angle_);
+      evaluate(x, false);
+      for (std::size_t i = 0; i < N; ++i) {
+        effect_rate_[i] = (side == 0 ? S(0) : effect_rate_[i]) + weight * deflection_[i];
+      }
+      if (!moves_) continue;
+      angle_ = chain;
+      FlangePose<S> flange;
+      Vec3<S> point, turn;
+      pass(flange);
+      flange_point(flange, tool_point_, point);
+      rotation_error(target_axes_, flange.axes, turn);
+      rest.linear = rest.linear + (target_point_ - point) * weight;
+      rest.angular = rest.angular + turn * weight;
+    }
+  }
+
   /// What the last correction of the chain leaves.
   FLEXCOMP_ONCE void chain_left(const Vec3<S>& shift, const Vec3<S>& turn, const Vec3<S>& point,
                                 const std::array<S, N>& dq) {
@@ -297,17 +387,14 @@ class Correction {
       turn_chain();
       evaluate(q, true);
     }
-    if (moves_) psi_ = q;
-    std::array<S, N> share;  // w of (C15): change of the reading per change of the deflection
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) {
       const S y = deflection_[i];
       q[i] -= y;
       ahead_[i] -= y;
-      share[i] = S(1);
     }
     if (model_.plan().size(group::own) != 0 &&
-        !subtract_own_deflections(model_, context_, Tolerance<S>::own_rad, q, ahead_, share)) {
+        !subtract_own_deflections(model_, context_, Tolerance<S>::own_rad, q, ahead_, share_)) {
       converged_ = false;
     }
     if (linear_) {
@@ -315,7 +402,7 @@ class Correction {
       linearised_.change(model_, joints_, ahead_, change);
       FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
-        const S step = change[i] * share[i];
+        const S step = change[i] * share_[i];
         deflection_[i] += change[i];
         q[i] -= step;
         ahead_[i] -= step;
@@ -334,9 +421,9 @@ class Correction {
       for (std::size_t i = 0; i < N; ++i) {
         const S y = deflection_[i];
         size += y * y;
-        step[i] = (step[i] - y) * share[i];
+        step[i] = (step[i] - y) * share_[i];
       }
-      if (moves_) follow_links(q, share, step);
+      if (moves_) follow_links(q, step);
       S square = S(0);
       FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
@@ -362,15 +449,14 @@ class Correction {
 
   /// Solves the chain again, whose links have moved: psi, and with it the step of the readings q, take the change.
   /// `angle_` belongs to q.
-  FLEXCOMP_ONCE void follow_links(const std::array<S, N>& q, const std::array<S, N>& share,
-                                  std::array<S, N>& step) {
+  FLEXCOMP_ONCE void follow_links(const std::array<S, N>& q, std::array<S, N>& step) {
     const std::array<S, N> from = psi_;
     std::array<S, N> to_psi;
     for (std::size_t i = 0; i < N; ++i) to_psi[i] = psi_[i] - q[i];
     rotate_all(angle_, to_psi, square_of(to_psi));
     solve_chain(psi_, most_corrections - 1, most_corrections - 1);
     for (std::size_t i = 0; i < N; ++i) {
-      step[i] += (psi_[i] - from[i]) * share[i];
+      step[i] += (psi_[i] - from[i]) * share_[i];
       ahead_[i] = q[i] - from[i];
     }
   }
@@ -389,16 +475,21 @@ class Correction {
   Vec3<S> tool_point_;                    ///< in the flange frame
   S turned_;                              ///< square of the turns since the Jacobian was factored
   std::array<S, N> deflection_;           ///< y of (C11), rad
-  std::array<S, N> psi_;                  ///< of the chain, where its links move
+  std::array<S, N> psi_;                  ///< joint angles of the chain, rad
+  std::array<S, N> share_;                ///< w of (C15): change of the reading per change of the deflection
+  const std::array<S, N>* command_rate_ = nullptr;  ///< rad/s
+  SmallMotion<S> target_rate_;                      ///< of tool point and flange, by the command's rate
   StaticLoad<S> load_;
   LinearisedDeflection<S, N> linearised_;
   Slots<S, N> slots_;
+  Mat3<S> moved_base_;   ///< rotation of B, where effects move it
   bool loaded_ = false;  ///< some effect follows loads
   bool linear_ = false;  ///< the first-order change of the deflection is known (C13)
   bool moves_ = false;   ///< some effect moves links, base or tool
   bool fresh_ = false;   ///< the Jacobian is that of the chain
   bool converged_ = true;
-  S joint_left_ = S(0);  ///< square of what the last iterates leave of the joints, rad^2
+  std::array<S, N> effect_rate_{};  ///< of all effects but the own ones, rad/s
+  S joint_left_ = S(0);             ///< square of what the last iterates leave of the joints, rad^2
   S position_left_ = S(0), orientation_left_ = S(0);
 };
 

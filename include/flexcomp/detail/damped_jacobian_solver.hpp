@@ -170,6 +170,15 @@ class DampedJacobianSolver {
     if (!(regular_ >= settings.singular_below * settings.singular_below)) damped_ = true;
   }
 
+  /// Motion of tool point (m) and flange (rad) by joint turns, to first order: J dq.
+  void motion_by(const std::array<S, N>& dq, SmallMotion<S>& out) const {
+    out.linear = out.angular = {S(0), S(0), S(0)};
+    for (std::size_t i = 0; i < N; ++i) {
+      out.linear = out.linear + column_[i].origin * dq[i];
+      out.angular = out.angular + column_[i].axis * dq[i];
+    }
+  }
+
   /// True where any solution so far was damped (C9) or scaled (C10).
   bool is_damped() const { return damped_; }
   /// kappa of (C9), the smaller one of both blocks, at most 1: m^2, or 1 for orientation.

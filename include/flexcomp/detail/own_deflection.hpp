@@ -37,6 +37,19 @@ inline void add_own_deflection(const Model<S, N, Cap>& model, const Term<S>& ter
   }
 }
 
+/// Expansions of the own deflections of all joints at the readings q (rad).
+template <class S, std::size_t N, class Cap>
+inline void own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
+                            const std::array<S, N>& q, std::array<Expansion<S>, N>& own) {
+  for (Expansion<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
+  Wave<S> wave;
+  const std::size_t count = model.plan().size(group::own);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Term<S>& term = model.effect_of(group::own, k);
+    add_own_deflection(model, term, q[term.joint], context, wave, own[term.joint]);
+  }
+}
+
 /// Most evaluations of a joint's own deflections.
 constexpr int most_own_steps = 4;
 
@@ -50,13 +63,7 @@ inline bool subtract_own_deflections(const Model<S, N, Cap>& model, const Contex
   const std::array<S, N> target = q;
   for (int n = 0; n < most_own_steps; ++n) {
     std::array<Expansion<S>, N> own;
-    for (Expansion<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
-    Wave<S> wave;
-    const std::size_t count = model.plan().size(group::own);
-    for (std::size_t k = 0; k < count; ++k) {
-      const Term<S>& term = model.effect_of(group::own, k);
-      add_own_deflection(model, term, q[term.joint], context, wave, own[term.joint]);
-    }
+    own_deflections(model, context, q, own);
     S largest = S(0);
     for (std::size_t i = 0; i < N; ++i) {
       const S w = S(1) / (S(1) + own[i].slope);

@@ -215,6 +215,17 @@ inline void flange_point(const FlangePose<S>& flange, const Vec3<S>& at, Vec3<S>
   point.z = flange.origin.z + (f.a.z * x + f.b.z * y + f.c.z * z);
 }
 
+/// Motion of the tool point (m) and rotation (rad) by joint turns dq (rad), to first order.
+template <class S, std::size_t N>
+inline void linear_motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool,
+                          const std::array<S, N>& dq, SmallMotion<S>& out) {
+  out.linear = out.angular = {S(0), S(0), S(0)};
+  for (std::size_t i = 0; i < N; ++i) {
+    out.linear = out.linear + cross(joint[i].axis, tool - joint[i].origin) * dq[i];
+    out.angular = out.angular + joint[i].axis * dq[i];
+  }
+}
+
 /// Motion of the tool point (m) and rotation (rad) by joint turns dq (rad), to second order (C6).
 template <class S, std::size_t N>
 inline void motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool, const std::array<S, N>& dq,
