@@ -49,41 +49,23 @@ inline bool is_finite_context(const Context<S, N>& c) {
   return check.passed();
 }
 
-}  // namespace detail
-
-/// Inverse compensation (C1): the joint command `out.q` (rad) at which the arm with all its terms has the
-/// pose that the nominal arm has at q_command (rad).
-///
-/// The result is a pure function of the arguments; work is bounded on any input (section 10 of
-/// docs/compensation.md). Refused (command passed through): a command that is not finite or lies beyond a
-/// joint limit, a context that is not finite, and effects that grow beyond all bounds (a change of more than
-/// 1e4 rad, an overflow). Otherwise the result is finite, within the joint limits, and no joint differs from
-/// its command by more than settings.largest_correction_rad (C17).
-///
-/// Where `rate` is given (rad/s of the command in, of out.q out), its result is the derivative of out.q along the
-/// command's rate (C22), context and set standing still; where anything holds the step back (out.flags), it is the
-/// command's own.
+/// compensate(), by a correction that keeps what its rate needs; q is the solution before the joint limits. False where it is
+/// refused.
 template <class S, std::size_t N, class Cap>
-inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
-                       const Context<S, N>& context, const CompensationSettings<S>& settings,
-                       Compensated<S, N>& out, std::array<S, N>* rate = nullptr) {
-  const auto refuse = [&out, &q_command] {
-    out.q = q_command;
-    out.flags = step_flag::refused;
-    out.status = StepStatus::refused;
-    out.remaining_position_m = out.remaining_orientation_rad = S(0);
-  };
+FLEXCOMP_ONCE bool compensate_by(Correction<S, N, Cap>& correction, const Model<S, N, Cap>& model,
+                                 const std::array<S, N>& q_command, const Context<S, N>& context, S largest,
+                                 Compensated<S, N>& out, std::array<S, N>& q) {
+  for (std::size_t i = 0; i < N; ++i) out.q[i] = q_command[i];
+  out.flags = step_flag::refused;
+  out.status = StepStatus::refused;
+  out.remaining_position_m = out.remaining_orientation_rad = S(0);
   for (std::size_t i = 0; i < N; ++i) {
-    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return refuse();
+    if (!(q_command[i] >= model.lower(i) && q_command[i] <= model.upper(i))) return false;
+    q[i] = q_command[i];
   }
   // Checked here because a grid is constant outside its nodes, where a NaN would not show.
-  if (!detail::is_finite_context(context)) return refuse();
-  const S largest = settings.largest_correction_rad;
-  detail::Correction<S, N, Cap> correction(model, context, settings);
-  std::array<S, N> q;
-  FLEXCOMP_UNROLL
-  for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
-  correction.run(q, rate);
+  if (!is_finite_context(context)) return false;
+  correction.run(q);
   // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);
   FLEXCOMP_UNROLL
@@ -91,7 +73,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
     const S change = q[i] - q_command[i];
     square += change * change;
   }
-  if (!(square < S(1e8))) return refuse();
+  if (!(square < S(1e8))) return false;
   unsigned flags = correction.is_damped() ? step_flag::near_singular : 0U;
   if (!correction.has_converged()) flags |= step_flag::not_converged;
   // What limits cut off of the joints: at most as much turn of the tool, and as much at the arm's reach of its position.
@@ -120,11 +102,45 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   out.status = summary(out.flags);
   out.remaining_position_m = correction.position_left() + cut * model.plan().reach();
   out.remaining_orientation_rad = correction.orientation_left() + cut;
-  if (rate != nullptr && flags == 0) {
-    std::array<S, N> corrected;
-    correction.rate(q, corrected);
-    *rate = corrected;
+  return true;
+}
+
+}  // namespace detail
+
+/// Inverse compensation (C1): the joint command `out.q` (rad) at which the arm with all its terms has the
+/// pose that the nominal arm has at q_command (rad).
+///
+/// The result is a pure function of the arguments; work is bounded on any input (section 10 of
+/// docs/compensation.md). Refused (command passed through): a command that is not finite or lies beyond a
+/// joint limit, a context that is not finite, and effects that grow beyond all bounds (a change of more than
+/// 1e4 rad, an overflow). Otherwise the result is finite, within the joint limits, and no joint differs from
+/// its command by more than settings.largest_correction_rad (C17).
+template <class S, std::size_t N, class Cap>
+inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
+                       const Context<S, N>& context, const CompensationSettings<S>& settings,
+                       Compensated<S, N>& out) {
+  detail::Correction<S, N, Cap> correction(model, context, settings);
+  std::array<S, N> q;
+  detail::compensate_by(correction, model, q_command, context, settings.largest_correction_rad, out, q);
+}
+
+/// compensate() with the rate of the corrected command (C22): the derivative of out.q along q_rate_command (rad/s), context
+/// and set standing still. Where anything holds the step back (out.flags) there is none: false, and q_rate is the command's.
+template <class S, std::size_t N, class Cap>
+inline bool compensate_rate(const Model<S, N, Cap>& model, const std::array<S, N>& q_command,
+                            const std::array<S, N>& q_rate_command, const Context<S, N>& context,
+                            const CompensationSettings<S>& settings, Compensated<S, N>& out,
+                            std::array<S, N>& q_rate) {
+  detail::Correction<S, N, Cap> correction(model, context, settings, &q_rate_command);
+  std::array<S, N> q;
+  q_rate = q_rate_command;
+  if (!detail::compensate_by(correction, model, q_command, context, settings.largest_correction_rad, out,
+                             q) ||
+      out.flags != 0) {
+    return false;
   }
+  correction.rate(q, q_rate);
+  return true;
 }
 
 /// compensate() by value.

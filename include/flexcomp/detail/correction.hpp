@@ -56,13 +56,12 @@ template <class S, std::size_t N, class Cap>
 class Correction {
  public:
   Correction(const Model<S, N, Cap>& model, const Context<S, N>& context,
-             const CompensationSettings<S>& settings)
-      : model_(model), context_(context), settings_(settings) {}
+             const CompensationSettings<S>& settings, const std::array<S, N>* command_rate = nullptr)
+      : model_(model), context_(context), settings_(settings), command_rate_(command_rate) {}
 
   /// Corrected command for the command q (rad), in place; rate() may follow where the rate of the command (rad/s) is
   /// given. Work: at most 9 chain passes, 2 factorisations, 20 linear solutions and 7 evaluations of the effects.
-  void run(std::array<S, N>& q, const std::array<S, N>* command_rate = nullptr) {
-    command_rate_ = command_rate;
+  void run(std::array<S, N>& q) {
     undo_constant_terms(q);
     const CyclePlan<S, N, Cap>& plan = model_.plan();
     loaded_ = plan.needs_loads();
@@ -464,6 +463,7 @@ class Correction {
   const Model<S, N, Cap>& model_;
   const Context<S, N>& context_;
   const CompensationSettings<S>& settings_;
+  const std::array<S, N>* command_rate_;  ///< rad/s; null where rate() is not asked for
 
   DampedJacobianSolver<S, N> solver_;
   std::array<SinCos<S>, N> angle_;        ///< of the chain's joints
@@ -477,8 +477,7 @@ class Correction {
   std::array<S, N> deflection_;           ///< y of (C11), rad
   std::array<S, N> psi_;                  ///< joint angles of the chain, rad
   std::array<S, N> share_;                ///< w of (C15): change of the reading per change of the deflection
-  const std::array<S, N>* command_rate_ = nullptr;  ///< rad/s
-  SmallMotion<S> target_rate_;                      ///< of tool point and flange, by the command's rate
+  SmallMotion<S> target_rate_;            ///< of tool point and flange, by the command's rate
   StaticLoad<S> load_;
   LinearisedDeflection<S, N> linearised_;
   Slots<S, N> slots_;
