@@ -12,20 +12,9 @@ void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
   compensate(model, q_command_rad, context, settings, out);
 }
 
-// Not by target_residual(): the trace needs its poses as well, and a call of it takes more stack.
-RemainingError remaining_error(const FirmwareModel& model, const Joints& q_rad, const Joints& q_command_rad,
-                               const FirmwareContext& context) {
-  Workspace<Scalar, joints> workspace;
-  const Pose<Scalar> nominal = nominal_forward(model, q_command_rad);
-  const Pose<Scalar> flexible = forward(model, q_rad, context, workspace);
-  const Vector3<Scalar> p = nominal.position - flexible.position;
-  Vec3<Scalar> r;
-  detail::rotation_error(columns_of(nominal.rotation), columns_of(flexible.rotation), r);
-  const Scalar trace = dot<Scalar>(nominal.rotation.col(0), flexible.rotation.col(0)) +
-                       dot<Scalar>(nominal.rotation.col(1), flexible.rotation.col(1)) +
-                       dot<Scalar>(nominal.rotation.col(2), flexible.rotation.col(2));
-  using std::sqrt;
-  return {sqrt(dot<Scalar>(p, p)), sqrt(dot(r, r)), !(trace > Scalar(1))};
+RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints& q_rad,
+                                       const Joints& q_command_rad, const FirmwareContext& context) {
+  return flexcomp::remaining_error<Scalar>(model, q_rad, q_command_rad, context);
 }
 
 Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model) {

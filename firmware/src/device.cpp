@@ -79,7 +79,7 @@ wire::ProbeResponse Device::probe(const wire::ProbeRequest& request) const {
   corrected_command(*model, q, context, cycle_.settings().compensation, compensated);
   out.status = static_cast<std::uint16_t>(compensated.status);
   if (compensated.status == StepStatus::refused) return out;
-  const RemainingError residual = remaining_error(*model, compensated.q, q, context);
+  const RemainingError<Scalar> residual = remaining_error(*model, compensated.q, q, context);
   for (std::size_t j = 0; j < joints; ++j) out.q_rad[j] = to_binary64_bits(compensated.q[j]);
   out.position_m = to_binary64_bits(residual.position_m);
   out.orientation_rad = to_binary64_bits(residual.orientation_rad);

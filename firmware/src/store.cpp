@@ -188,7 +188,7 @@ bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
       context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
       context.relative_speed[j] = context.direction[j];
     }
-    const RemainingError change = remaining_error(model, q, q, context);
+    const RemainingError<Scalar> change = remaining_error(model, q, q, context);
     if (!(change.position_m <= settings_.plausible_position_m)) {
       detail = micro(change.position_m);
       return false;

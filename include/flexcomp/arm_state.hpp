@@ -43,6 +43,26 @@ inline bool uncorrect(const Model<S, N, Cap>& model, const std::array<S, N>& q_r
   return false;
 }
 
+/// What is left of a pose.
+template <class S>
+struct RemainingError {
+  S position_m;                ///< 3-D distance
+  S orientation_rad;           ///< sine of the angle, which is the angle to third order
+  bool is_beyond_right_angle;  ///< of the angle: its sine decreases again
+};
+
+/// target_residual() by the kernels of the control cycle: the same to rounding and 1e-10 rad, in less flash beside them.
+template <class S, std::size_t N, class Cap>
+inline RemainingError<S> remaining_error(const Model<S, N, Cap>& model, const std::array<S, N>& q,
+                                         const std::array<S, N>& q_command, const Context<S, N>& context) {
+  const CompensationSettings<S> unused;
+  detail::Correction<S, N, Cap> correction(model, context, unused);
+  Vec3<S> shift, turn;
+  const S trace = correction.rest(q_command, q, shift, turn);
+  using std::sqrt;
+  return {sqrt(dot(shift, shift)), sqrt(dot(turn, turn)), !(trace > S(1))};
+}
+
 /// What loads and effects do to the joints of an arm at given readings.
 template <class S, std::size_t N>
 struct JointLoads {

@@ -144,6 +144,27 @@ TEST(ArmState, RateOfAStepThatIsHeldBackIsTheCommands) {
   EXPECT_EQ(corrected, rate);
 }
 
+TEST(ArmState, RemainingErrorIsTheForwardModels) {
+  arms::Random random(54);
+  double worst = 0;
+  for (const arms::Arm& arm : arms::all()) {
+    const auto model = arms::prepared(arm.robot, every_kind(arm, random));
+    for (int n = 0; n < 2000 / part; ++n) {
+      const Joints command = random.pose(arm.robot);
+      Joints q = command;
+      const double size = n % 3 == 0 ? 0 : n % 3 == 1 ? 0.01 : 3;
+      for (double& v : q) v += random.around(size);
+      const flexcomp::Context<double, 6> context = arms::random_context(arm.robot, random);
+      const auto left = flexcomp::remaining_error(model, q, command, context);
+      const auto expected = flexcomp::target_residual(model, q, command, context);
+      worst = std::max({worst, std::abs(left.position_m - expected.position_m),
+                        std::abs(left.orientation_rad - expected.orientation_rad)});
+    }
+  }
+  std::printf("[ measured ] remaining error to %.1e m, rad\n", worst);
+  EXPECT_LE(worst, 1e-10);
+}
+
 TEST(ArmState, LoadsAndDeflectionsAreTheForwardModels) {
   arms::Random random(53);
   double worst = 0, worst_torque = 0;

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "flexcomp/compensate.hpp"
+#include "flexcomp/arm_state.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp_firmware/config.hpp"
 
@@ -21,15 +21,9 @@ void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
                        const FirmwareContext& context, const CompensationSettings<Scalar>& settings,
                        Compensated<Scalar, joints>& out);
 
-/// Remaining error of a pose, with the range of its angle.
-struct RemainingError {
-  Scalar position_m;           ///< 3-D distance
-  Scalar orientation_rad;      ///< sine of the angle, as in target_residual()
-  bool is_beyond_right_angle;  ///< of the angle: its sine decreases again
-};
-/// Remaining error at q_rad: forward model against the nominal pose at q_command_rad, as target_residual().
-RemainingError remaining_error(const FirmwareModel& model, const Joints& q_rad, const Joints& q_command_rad,
-                               const FirmwareContext& context);
+/// remaining_error() of the core.
+RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints& q_rad,
+                                       const Joints& q_command_rad, const FirmwareContext& context);
 
 /// model_from_image() of the core: prepares a model from an image that check_image() accepted.
 Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model);

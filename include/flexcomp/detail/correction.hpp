@@ -64,10 +64,7 @@ class Correction {
   void run(std::array<S, N>& q) {
     undo_constant_terms(q);
     const CyclePlan<S, N, Cap>& plan = model_.plan();
-    loaded_ = plan.needs_loads();
-    moves_ = plan.size(group::move) != 0;
-    if (loaded_) static_load(model_, context_, load_);
-    linear_ = loaded_ && load_.is_plain;
+    take_load();
     FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) deflection_[i] = S(0);
     if (moves_) evaluate(q, true);
@@ -133,16 +130,51 @@ class Correction {
     }
   }
 
+  /// Rest (C5) at the readings q (rad) for a command: position (m), orientation (rad), and the trace of its rotation. Work:
+  /// two chain passes, one evaluation of the effects.
+  S rest(const std::array<S, N>& q_command, const std::array<S, N>& q, Vec3<S>& shift, Vec3<S>& turn) {
+    take_nominal(q_command);
+    take_load();
+    sin_cos_all(q, model_.shapes(), angle_);
+    evaluate(q, false);
+    std::array<Expansion<S>, N> own;
+    own_deflections(model_, context_, q, own);
+    for (std::size_t i = 0; i < N; ++i) ahead_[i] = deflection_[i] + own[i].value;
+    turn_chain();
+    FlangePose<S> flange;
+    Vec3<S> point;
+    pass(flange);
+    flange_point(flange, tool_point_, point);
+    shift = target_point_ - point;
+    rotation_error(target_axes_, flange.axes, turn);
+    return dot(target_axes_.a, flange.axes.a) + dot(target_axes_.b, flange.axes.b) +
+           dot(target_axes_.c, flange.axes.c);
+  }
+
   bool is_damped() const { return solver_.is_damped(); }    ///< near a singularity
   bool has_converged() const { return converged_; }         ///< every iteration ended below its tolerance
   S position_left() const { return position_left_; }        ///< m, as the last iterate shows it
   S orientation_left() const { return orientation_left_; }  ///< rad, likewise
 
  private:
-  void undo_constant_terms(std::array<S, N>& q) {
+  void take_load() {
+    loaded_ = model_.plan().needs_loads();
+    moves_ = model_.plan().size(group::move) != 0;
+    if (loaded_) static_load(model_, context_, load_);
+    linear_ = loaded_ && load_.is_plain;
+  }
+
+  /// Nominal pose of the command and, by the constant terms, target (C4). `angle_` belongs to the nominal chain.
+  void take_nominal(const std::array<S, N>& q) {
     sin_cos_all(q, model_.nominals(), angle_);
     rigid_pass(model_.nominals(), angle_, solver_.joints(), nominal_);
     flange_point(nominal_, vec3<S>(model_.nominal_tool().position), nominal_point_);
+    set_target(model_.base_pose(), model_.plan().tool_turn());
+    tool_point_ = vec3<S>(model_.tool_pose().position);
+  }
+
+  void undo_constant_terms(std::array<S, N>& q) {
+    take_nominal(q);
     solver_.set(nominal_point_, settings_);
     if (command_rate_ != nullptr) solver_.motion_by(*command_rate_, target_rate_);
     SmallMotion<S> move;
@@ -168,8 +200,6 @@ class Correction {
       ahead_[i] = S(0);
     }
     rotate_all(angle_, by, turned_);
-    set_target(model_.base_pose(), model_.plan().tool_turn());
-    tool_point_ = vec3<S>(model_.tool_pose().position);
   }
 
   /// Target of flange and tool point (C4): the nominal pose without B and without the tool's own turn.
