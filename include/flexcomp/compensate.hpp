@@ -68,7 +68,6 @@ FLEXCOMP_ONCE bool compensate_by(Correction<S, N, Cap>& correction, const Model<
   correction.run(q);
   // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);
-  FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) {
     const S change = q[i] - q_command[i];
     square += change * change;
@@ -131,7 +130,8 @@ inline bool compensate_rate(const Model<S, N, Cap>& model, const std::array<S, N
                             const std::array<S, N>& q_rate_command, const Context<S, N>& context,
                             const CompensationSettings<S>& settings, Compensated<S, N>& out,
                             std::array<S, N>& q_rate) {
-  detail::Correction<S, N, Cap> correction(model, context, settings, &q_rate_command);
+  detail::CommandRate<S, N> rate{q_rate_command, {}, {}};
+  detail::Correction<S, N, Cap> correction(model, context, settings, &rate);
   std::array<S, N> q;
   q_rate = q_rate_command;
   if (!detail::compensate_by(correction, model, q_command, context, settings.largest_correction_rad, out,

@@ -39,6 +39,23 @@ struct Load {
   Vector3<S> moment;  ///< N·m
 };
 
+/// Sum of all effects at each slot (M5), on top of the constant values; m and rad.
+template <class S, std::size_t N>
+struct Slots {
+  std::array<std::array<S, 6>, N> link;  ///< by link and slot
+  std::array<S, 6> base;                 ///< by slot
+  std::array<S, 6> tool;                 ///< by slot
+  std::array<S, 3> point;                ///< by slot
+
+  /// Sets all to 0. A temporary of this size does not fit on a controller's stack.
+  void clear() {
+    for (std::array<S, 6>& values : link) values.fill(S(0));
+    base.fill(S(0));
+    tool.fill(S(0));
+    point.fill(S(0));
+  }
+};
+
 /// Memory of one evaluation, and its intermediate results. The caller sets nothing in it.
 template <class S, std::size_t N = 6>
 struct Workspace {

@@ -51,13 +51,21 @@ struct Tolerance<float> {
   static constexpr float own_rad = 3e-6F;
 };
 
+/// Rate of a command, and what its derivative needs (C22).
+template <class S, std::size_t N>
+struct CommandRate {
+  const std::array<S, N>& command;  ///< rad/s
+  SmallMotion<S> target;            ///< of tool point and flange by it, m/s and rad/s
+  std::array<S, N> effects{};       ///< of all effects but the own ones, rad/s
+};
+
 /// See the head of the file.
 template <class S, std::size_t N, class Cap>
 class Correction {
  public:
   Correction(const Model<S, N, Cap>& model, const Context<S, N>& context,
-             const CompensationSettings<S>& settings, const std::array<S, N>* command_rate = nullptr)
-      : model_(model), context_(context), settings_(settings), command_rate_(command_rate) {}
+             const CompensationSettings<S>& settings, CommandRate<S, N>* rate = nullptr)
+      : model_(model), context_(context), settings_(settings), rate_(rate) {}
 
   /// Corrected command for the command q (rad), in place; rate() may follow where the rate of the command (rad/s) is
   /// given. Work: at most 9 chain passes, 2 factorisations, 20 linear solutions and 7 evaluations of the effects.
@@ -65,11 +73,9 @@ class Correction {
     undo_constant_terms(q);
     const CyclePlan<S, N, Cap>& plan = model_.plan();
     take_load();
-    FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) deflection_[i] = S(0);
     if (moves_) evaluate(q, true);
     solve_chain(q, 1, most_corrections - 1);
-    FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) {
       psi_[i] = q[i];
       share_[i] = S(1);
@@ -95,9 +101,10 @@ class Correction {
     pass(flange);
     flange_point(flange, tool_point_, point);
     const std::array<JointAxis<S>, N> joints = joints_;
-    const Mat3<S> b = model_.base_moves() ? moved_base_ : columns_of(model_.base_pose().rotation);
+    const Mat3<S> b =
+        columns_of(model_.base_moves() ? small_pose(moved_.base).rotation : model_.base_pose().rotation);
     const auto into_base = [&b](const Vec3<S>& v) { return Vec3<S>{dot(b.a, v), dot(b.b, v), dot(b.c, v)}; };
-    const SmallMotion<S> target = {into_base(target_rate_.linear), into_base(target_rate_.angular)};
+    const SmallMotion<S> target = {into_base(rate_->target.linear), into_base(rate_->target.angular)};
     SmallMotion<S> rest = target;
     // The slopes of the own deflections at the solution.
     std::array<Expansion<S>, N> own;
@@ -117,7 +124,7 @@ class Correction {
       }
       S square = S(0), changed = S(0);
       for (std::size_t i = 0; i < N; ++i) {
-        const S v = (psi_rate[i] - effect_rate_[i]) * share_[i];
+        const S v = (psi_rate[i] - rate_->effects[i]) * share_[i];
         const S change = round == 0 ? v : v - out[i];
         out[i] = v;
         square += v * v;
@@ -176,7 +183,7 @@ class Correction {
   void undo_constant_terms(std::array<S, N>& q) {
     take_nominal(q);
     solver_.set(nominal_point_, settings_);
-    if (command_rate_ != nullptr) solver_.motion_by(*command_rate_, target_rate_);
+    if (rate_ != nullptr) solver_.motion_by(rate_->command, rate_->target);
     SmallMotion<S> move;
     constant_twist(model_, angle_, move);
     const SmallMotion<S>& base = model_.plan().base_twist();
@@ -190,7 +197,6 @@ class Correction {
     std::array<S, N> by;
     solver_.solve(shift, turn, largest, largest, by);
     turned_ = S(0);
-    FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) {
       const S d = by[i];
       q[i] += d;
@@ -238,49 +244,29 @@ class Correction {
       std::array<S, N> x;
       for (std::size_t i = 0; i < N; ++i) x[i] = q[i] - deflection_[i];
       add_other_deflections(model_, x, context_, deflection_);
-      move_links(x, loads);
+      move(x, loads);
     } else {
       add_other_deflections(model_, q, context_, deflection_);
-      if (moves_) move_links(q, loads);
+      if (moves_) move(q, loads);
     }
   }
 
   /// Links, base and tool as the effects move them at the readings x.
-  FLEXCOMP_ONCE void move_links(const std::array<S, N>& x, const LinkLoads<S, N>& loads) {
-    slot_values(model_, context_, x, angle_, load_, loads, slots_);
-    Pose<S> base;
-    Matrix3<S> tool_turn;
-    if (model_.tool_moves()) {
-      std::array<S, 6> six = model_.tool();
-      for (std::size_t k = 0; k < 6; ++k) six[k] += slots_.tool[k];
-      const Pose<S> real = model_.nominal_tool() * small_pose(six);
-      tool_point_ = vec3<S>(real.position);
-      tool_turn = turn_between(model_.nominal_tool().rotation, real.rotation);
-    }
-    if (model_.base_moves()) {
-      std::array<S, 6> six = model_.base();
-      for (std::size_t k = 0; k < 6; ++k) six[k] += slots_.base[k];
-      base = small_pose(six);
-      moved_base_ = columns_of(base.rotation);
-    }
-    if (model_.tool_moves() || model_.base_moves()) {
-      set_target(model_.base_moves() ? base : model_.base_pose(),
-                 model_.tool_moves() ? tool_turn : model_.plan().tool_turn());
-    }
+  FLEXCOMP_ONCE void move(const std::array<S, N>& x, const LinkLoads<S, N>& loads) {
+    move_parts(model_, context_, x, angle_, load_, loads, moved_);
+    if (!model_.base_moves() && !model_.tool_moves()) return;
+    const Pose<S> tool = model_.nominal_tool() * small_pose(moved_.tool);
+    tool_point_ = vec3<S>(tool.position);
+    set_target(small_pose(moved_.base), turn_between(model_.nominal_tool().rotation, tool.rotation));
   }
 
   /// Axes and flange of the chain at `angle_`, with its links as the effects have moved them.
   void pass(FlangePose<S>& flange) {
     if (moves_) {
-      moved_pass(flange);
+      rigid_pass(moved_.links, angle_, joints_, flange);
     } else {
       rigid_pass(model_.shapes(), angle_, joints_, flange);
     }
-  }
-  FLEXCOMP_ONCE void moved_pass(FlangePose<S>& flange) {
-    std::array<MovedLink<S>, N> links;
-    moved_links(model_, slots_, links);
-    rigid_pass(links, angle_, joints_, flange);
   }
 
   /// Turns the chain's joints, psi, until the flange is at the target (C5, C6): corrections `first` to `last`. q
@@ -323,14 +309,12 @@ class Correction {
         left = size * size;
         limit = tolerance * square;
         square = S(0);
-        FLEXCOMP_UNROLL
         for (std::size_t i = 0; i < N; ++i) {
           const S d = dq[i] + rest[i];
           dq[i] = d;
           square += d * d;
         }
       }
-      FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
         q[i] += dq[i];
         ahead_[i] += dq[i];
@@ -376,7 +360,7 @@ class Correction {
       sin_cos_all(x, model_.shapes(), angle_);
       evaluate(x, false);
       for (std::size_t i = 0; i < N; ++i) {
-        effect_rate_[i] = (side == 0 ? S(0) : effect_rate_[i]) + weight * deflection_[i];
+        rate_->effects[i] = (side == 0 ? S(0) : rate_->effects[i]) + weight * deflection_[i];
       }
       if (!moves_) continue;
       angle_ = chain;
@@ -404,7 +388,6 @@ class Correction {
   /// `angle_` follows q.
   void turn_chain() {
     rotate_all(angle_, ahead_, square_of(ahead_));
-    FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) ahead_[i] = S(0);
   }
 
@@ -416,7 +399,6 @@ class Correction {
       turn_chain();
       evaluate(q, true);
     }
-    FLEXCOMP_UNROLL
     for (std::size_t i = 0; i < N; ++i) {
       const S y = deflection_[i];
       q[i] -= y;
@@ -429,7 +411,6 @@ class Correction {
     if (linear_) {
       std::array<S, N> change;
       linearised_.change(model_, joints_, ahead_, change);
-      FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
         const S step = change[i] * share_[i];
         deflection_[i] += change[i];
@@ -441,12 +422,10 @@ class Correction {
     S before_square = S(1);
     for (int n = 0; n < most_deflection_steps; ++n) {
       std::array<S, N> step;
-      FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) step[i] = deflection_[i];
       if (loaded_ || moves_) turn_chain();
       evaluate(q, false);
       S size = S(0);
-      FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
         const S y = deflection_[i];
         size += y * y;
@@ -454,7 +433,6 @@ class Correction {
       }
       if (moves_) follow_links(q, step);
       S square = S(0);
-      FLEXCOMP_UNROLL
       for (std::size_t i = 0; i < N; ++i) {
         const S d = step[i];
         q[i] += d;
@@ -493,7 +471,7 @@ class Correction {
   const Model<S, N, Cap>& model_;
   const Context<S, N>& context_;
   const CompensationSettings<S>& settings_;
-  const std::array<S, N>* command_rate_;  ///< rad/s; null where rate() is not asked for
+  CommandRate<S, N>* rate_;  ///< null where rate() is not asked for
 
   DampedJacobianSolver<S, N> solver_;
   std::array<SinCos<S>, N> angle_;        ///< of the chain's joints
@@ -507,18 +485,15 @@ class Correction {
   std::array<S, N> deflection_;           ///< y of (C11), rad
   std::array<S, N> psi_;                  ///< joint angles of the chain, rad
   std::array<S, N> share_;                ///< w of (C15): change of the reading per change of the deflection
-  SmallMotion<S> target_rate_;            ///< of tool point and flange, by the command's rate
   StaticLoad<S> load_;
   LinearisedDeflection<S, N> linearised_;
-  Slots<S, N> slots_;
-  Mat3<S> moved_base_;   ///< rotation of B, where effects move it
+  MovedParts<S, N> moved_;
   bool loaded_ = false;  ///< some effect follows loads
   bool linear_ = false;  ///< the first-order change of the deflection is known (C13)
   bool moves_ = false;   ///< some effect moves links, base or tool
   bool fresh_ = false;   ///< the Jacobian is that of the chain
   bool converged_ = true;
-  std::array<S, N> effect_rate_{};  ///< of all effects but the own ones, rad/s
-  S joint_left_ = S(0);             ///< square of what the last iterates leave of the joints, rad^2
+  S joint_left_ = S(0);  ///< square of what the last iterates leave of the joints, rad^2
   S position_left_ = S(0), orientation_left_ = S(0);
 };
 

@@ -79,48 +79,58 @@ inline void add_other_deflections(const Model<S, N, Cap>& model, const std::arra
   }
 }
 
-/// Values of the effects that move links, base and tool, at their slots (m, rad).
+/// Links, base and tool as terms and effects have moved them.
+template <class S, std::size_t N>
+struct MovedParts {
+  std::array<MovedLink<S>, N> links;
+  std::array<S, 6> base, tool;  ///< by slot, m and rad
+};
+
+/// Evaluates the effects that move links, base and tool at the readings q (rad).
 template <class S, std::size_t N, class Cap>
-FLEXCOMP_ONCE void slot_values(const Model<S, N, Cap>& model, const Context<S, N>& context,
-                               const std::array<S, N>& q, const std::array<SinCos<S>, N>& angle,
-                               const StaticLoad<S>& load, const LinkLoads<S, N>& loads, Slots<S, N>& slots) {
-  slots.clear();
+FLEXCOMP_ONCE void move_parts(const Model<S, N, Cap>& model, const Context<S, N>& context,
+                              const std::array<S, N>& q, const std::array<SinCos<S>, N>& angle,
+                              const StaticLoad<S>& load, const LinkLoads<S, N>& loads,
+                              MovedParts<S, N>& out) {
+  for (std::size_t i = 0; i < N; ++i) {
+    // Number by number: as a whole it would go through memcpy. The offset is in the angles.
+    const LinkShape<S>& from = model.shape(i);
+    MovedLink<S>& link = out.links[i];
+    link.d = from.d;
+    link.a = from.a;
+    link.alpha.s = from.alpha.s;
+    link.alpha.c = from.alpha.c;
+    link.beta.s = from.beta.s;
+    link.beta.c = from.beta.c;
+    link.gamma.s = S(0);
+    link.gamma.c = S(1);
+    link.has_beta = from.has_beta;
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    out.base[k] = model.base()[k];
+    out.tool[k] = model.tool()[k];
+  }
   Wave<S> wave;
   const std::size_t count = model.plan().size(group::move);
   for (std::size_t k = 0; k < count; ++k) {
     const Term<S>& term = model.effect_of(group::move, k);
     const S value = term.coefficient * loaded_basis_value(model, term, context, q, angle, load, loads, wave);
-    std::array<S, 6>& of = term.place.body == body::base   ? slots.base
-                           : term.place.body == body::tool ? slots.tool
-                                                           : slots.link[term.place.body - 1U];
-    of[term.place.slot] += value;
-  }
-}
-
-/// Links with constant terms as effects have moved them.
-template <class S, std::size_t N, class Cap>
-inline void moved_links(const Model<S, N, Cap>& model, const Slots<S, N>& slots,
-                        std::array<MovedLink<S>, N>& out) {
-  for (std::size_t i = 0; i < N; ++i) {
-    const std::array<S, 6>& by = slots.link[i];
-    const unsigned moved = model.link_moves(i);
-    MovedLink<S>& link = out[i];
-    const LinkShape<S>& from = model.shape(i);
-    // The offset is not copied: it is in the angles.
-    const auto turned = [&](std::uint8_t s, const SinCos<S>& a, SinCos<S>& to) {
-      if ((moved & (1U << s)) != 0) {
-        to = rotate(a, by[s]);
+    const std::uint8_t at = term.place.slot;
+    if (term.place.body == body::base) {
+      out.base[at] += value;
+    } else if (term.place.body == body::tool) {
+      out.tool[at] += value;
+    } else {
+      MovedLink<S>& link = out.links[term.place.body - 1U];
+      if (at == slot::d) {
+        link.d += value;
+      } else if (at == slot::a) {
+        link.a += value;
       } else {
-        to.s = a.s;
-        to.c = a.c;
+        SinCos<S>& turned = at == slot::alpha ? link.alpha : at == slot::beta ? link.beta : link.gamma;
+        turned = rotate(turned, value);
       }
-    };
-    link.d = from.d + by[slot::d];
-    link.a = from.a + by[slot::a];
-    link.has_beta = from.has_beta;
-    turned(slot::alpha, from.alpha, link.alpha);
-    turned(slot::beta, from.beta, link.beta);
-    turned(slot::gamma, {S(0), S(1)}, link.gamma);
+    }
   }
 }
 

@@ -59,8 +59,8 @@ class LinearisedDeflection {
 
   /// First-order change of the deflection (rad) when the joints turn by `by` (rad).
   template <class Cap>
-  void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints,
-              const std::array<S, N>& by, std::array<S, N>& delta) const {
+  FLEXCOMP_ONCE void change(const Model<S, N, Cap>& model, const std::array<JointAxis<S>, N>& joints,
+                            const std::array<S, N>& by, std::array<S, N>& delta) const {
     // The z of axis x arm gives the torque: joints further out move the arm's end, joints further in turn it
     // as a whole.
     S ux = S(0), uy = S(0);

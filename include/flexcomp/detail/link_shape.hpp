@@ -25,23 +25,6 @@ struct LinkShape {
   bool has_beta = false;         ///< false: Rot(y,beta) is left out
 };
 
-/// Sum of all effects at each slot (M5), on top of the constant values; m and rad.
-template <class S, std::size_t N>
-struct Slots {
-  std::array<std::array<S, 6>, N> link;  ///< by link and slot
-  std::array<S, 6> base;                 ///< by slot
-  std::array<S, 6> tool;                 ///< by slot
-  std::array<S, 3> point;                ///< by slot
-
-  /// Sets all to 0. They are not set before: where no effect moves a link it would cost a cycle more than it gives.
-  void clear() {
-    for (std::array<S, 6>& values : link) values.fill(S(0));
-    base.fill(S(0));
-    tool.fill(S(0));
-    point.fill(S(0));
-  }
-};
-
 /// Link whose slots effects have moved: gamma as well, Rot(z) Trans(z,d) Trans(x,a) Rot(y,gamma) Rot(x,alpha)
 /// Rot(y,beta).
 template <class S>

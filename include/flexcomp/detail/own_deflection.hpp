@@ -39,8 +39,8 @@ inline void add_own_deflection(const Model<S, N, Cap>& model, const Term<S>& ter
 
 /// Expansions of the own deflections of all joints at the readings q (rad).
 template <class S, std::size_t N, class Cap>
-inline void own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
-                            const std::array<S, N>& q, std::array<Expansion<S>, N>& own) {
+FLEXCOMP_ONCE void own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
+                                   const std::array<S, N>& q, std::array<Expansion<S>, N>& own) {
   for (Expansion<S>& o : own) o.value = o.slope = o.half_curvature = S(0);
   Wave<S> wave;
   const std::size_t count = model.plan().size(group::own);
@@ -57,9 +57,9 @@ constexpr int most_own_steps = 4;
 /// change. `share` becomes w = 1 / (1 + own'). False where it does not end: the curvature's part of the step, of which the
 /// next term is a fraction, stays above `tolerance` (rad).
 template <class S, std::size_t N, class Cap>
-inline bool subtract_own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
-                                     const S& tolerance, std::array<S, N>& q, std::array<S, N>& ahead,
-                                     std::array<S, N>& share) {
+FLEXCOMP_ONCE bool subtract_own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
+                                            const S& tolerance, std::array<S, N>& q, std::array<S, N>& ahead,
+                                            std::array<S, N>& share) {
   const std::array<S, N> target = q;
   for (int n = 0; n < most_own_steps; ++n) {
     std::array<Expansion<S>, N> own;

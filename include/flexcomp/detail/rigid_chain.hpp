@@ -270,8 +270,8 @@ inline void motion(const std::array<JointAxis<S>, N>& joint, const Vec3<S>& tool
 /// Sines and cosines of readings plus the links' offsets. The readings are within the limits of a Model, thus
 /// in the range of the kernel.
 template <class S, std::size_t N>
-inline void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
-                        std::array<SinCos<S>, N>& angle) {
+FLEXCOMP_ONCE void sin_cos_all(const std::array<S, N>& q, const std::array<LinkShape<S>, N>& links,
+                               std::array<SinCos<S>, N>& angle) {
   for (std::size_t i = 0; i < N; ++i) {
     S s, c;
     sin_cos_kernel(q[i], s, c);
