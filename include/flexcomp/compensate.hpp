@@ -69,6 +69,7 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
                        Compensated<S, N>& out) {
   const auto refuse = [&out, &q_command] {
     out.q = q_command;
+    out.flags = step_flag::refused;
     out.status = StepStatus::refused;
   };
   for (std::size_t i = 0; i < N; ++i) {
@@ -101,20 +102,22 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
     square += change * change;
   }
   if (!(square < S(1e8))) return refuse();
-  out.status = solver.is_damped() ? StepStatus::near_singular : StepStatus::ok;
+  unsigned flags = solver.is_damped() ? step_flag::near_singular : 0U;
   if (square > largest * largest) {
     std::array<S, N> change;
     for (std::size_t i = 0; i < N; ++i) change[i] = q[i] - q_command[i];
     if (scale_to_limit(change, largest)) {
-      out.status = StepStatus::limited;
+      flags |= step_flag::limited;
       for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i] + change[i];
     }
   }
   for (std::size_t i = 0; i < N; ++i) {
     S x = q[i];
-    if (clamp_to(x, model.lower(i), model.upper(i))) out.status = StepStatus::at_limit;
+    if (clamp_to(x, model.lower(i), model.upper(i))) flags |= step_flag::at_limit;
     out.q[i] = x;
   }
+  out.flags = static_cast<std::uint16_t>(flags);
+  out.status = summary(out.flags);
 }
 
 /// compensate() by value.
