@@ -242,5 +242,91 @@ TEST(Motion, EveryBoundHoldsInEveryCycle) {
               fastest_offset, hardest_offset, fastest_correction);
 }
 
+/// What straight passes through singular poses make of a set of 4.2 mm where the rate acts.
+struct Passes {
+  long cycles = 0;
+  long rate_limited = 0;
+  long farther = 0;           ///< of these: off by more than the larger of the two errors
+  double farther_by_m = 0;    ///< at most
+  double farther_by_rad = 0;  ///< orientation
+};
+
+Passes passes_through_singularities(double singular_below, int count) {
+  Passes result;
+  std::mt19937_64 random(3);
+  const auto between = [&random](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  DeviceSettings settings;
+  settings.control.compensation.singular_below = real(singular_below);
+  const CompensationSettings<Scalar>& compensation = settings.control.compensation;
+  Arm arm(settings);
+  const Bytes image = make_image(arm.robot, 1, 10);
+  arm.push(image);
+  auto model = std::make_unique<FirmwareModel>();
+  model_from_image(image.data(), image.size(), arm.robot, *model);
+  FirmwareContext context = default_context<Scalar>(arm.robot);
+  for (int pass = 0; pass < count; ++pass) {
+    std::array<double, joints> middle{};
+    std::array<double, joints> step{};
+    for (double& v : middle) v = between(-1.5, 1.5);
+    const auto kind = random() % 4;
+    const double beside = random() % 2 != 0 ? 0 : std::pow(10.0, between(-5, -1.5));
+    if (kind == 0 || kind == 3) middle[4] = beside;
+    if (kind == 1 || kind == 3) middle[2] = beside;
+    if (kind == 2)
+      middle[1] = beside - std::atan2(0.45 * std::sin(middle[2]), 0.4 + 0.45 * std::cos(middle[2]));
+    double longest = 0;
+    for (double& v : step) {
+      v = between(-1, 1);
+      longest = std::max(longest, std::abs(v));
+    }
+    const double speed = std::pow(10.0, between(-1.5, 0.5)) * 1e-3;
+    const int half = std::min(600, static_cast<int>(0.6 / speed));
+    for (int k = -half; k <= half; ++k) {
+      Joints q;
+      for (std::size_t j = 0; j < joints; ++j) q[j] = real(middle[j] + k * speed / longest * step[j]);
+      constexpr unsigned under_way = step_flag::settling | step_flag::rate_limited;
+      for (int wait = 0; k == -half && wait < 3000 && (arm.step(q).flags & under_way) != 0;) ++wait;
+      const StepResult r = arm.step(q);
+      ++result.cycles;
+      if ((r.flags & step_flag::rate_limited) == 0) continue;
+      ++result.rate_limited;
+      for (std::size_t j = 0; j < joints; ++j) context.direction[j] = arm.device->cycle().direction(j);
+      Compensated<Scalar, joints> unlimited;
+      compensate(*model, q, context, compensation, unlimited);
+      const RemainingError out = remaining_error(*model, r.q, q, context);
+      const RemainingError none = remaining_error(*model, q, q, context);
+      const RemainingError all = remaining_error(*model, unlimited.q, q, context);
+      const double by_m = static_cast<double>(out.position_m - std::max(none.position_m, all.position_m));
+      const double by_rad =
+          static_cast<double>(out.orientation_rad - std::max(none.orientation_rad, all.orientation_rad));
+      if (by_m > 0) ++result.farther;
+      result.farther_by_m = std::max(result.farther_by_m, by_m);
+      result.farther_by_rad = std::max(result.farther_by_rad, by_rad);
+    }
+  }
+  std::printf(
+      "singular_below %.2f: %ld cycles, %ld rate-limited, %ld of them farther off than either, by up to "
+      "%.2f mm (orientation %.1f mrad)\n",
+      singular_below, result.cycles, result.rate_limited, result.farther, result.farther_by_m * 1e3,
+      result.farther_by_rad * 1e3);
+  return result;
+}
+
+// The factor is common to all joints, so that the tool stays near both; but a correction that is late is that
+// of another pose. How much that is, the threshold of the damping decides, which bounds how fast the answer
+// turns.
+TEST(Motion, WhileTheRateActs) {
+  const int count = static_cast<int>(std::min(motion_cycles(600), 6000L));
+  const Passes today = passes_through_singularities(0.05, count);
+  EXPECT_GT(today.rate_limited, 0);
+  EXPECT_LE(today.farther_by_m, 0.04);
+  const Passes wider = passes_through_singularities(0.1, count);
+  EXPECT_LE(wider.farther_by_m, 0.4e-3);
+  const Passes widest = passes_through_singularities(0.17, count);
+  EXPECT_EQ(widest.rate_limited, 0);
+}
+
 }  // namespace
 }  // namespace flexcomp::firmware::bench
