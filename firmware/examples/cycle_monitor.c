@@ -29,6 +29,7 @@ typedef struct figures {
   uint32_t late;
   uint32_t least_interval_ticks;
   uint32_t most_interval_ticks;
+  uint32_t flags;
   flexcomp_real command_rad[FLEXCOMP_JOINTS];
   flexcomp_real correction_rad[FLEXCOMP_JOINTS];
   step_figures steps[CLASSES][LOADS];
@@ -44,6 +45,7 @@ typedef struct sample {
   uint32_t cycle;
   uint32_t ticks;
   uint32_t flags;
+  int settling;
   int loaded;
   int standing;
   flexcomp_real correction_rad[FLEXCOMP_JOINTS];
@@ -68,7 +70,7 @@ static int class_of(const sample* s) {
   const int32_t since_last = (int32_t)(s->cycle - change_until) - 1;
   const int none = (s->flags & FLEXCOMP_FLAG_NO_SET) != 0;
   if (since_first >= 0 && since_last <= 0) return CHANGING;
-  if ((s->flags & FLEXCOMP_FLAG_SETTLING) != 0) return none ? SETTLING_OUT : SETTLING;
+  if (s->settling) return none ? SETTLING_OUT : SETTLING;
   return none ? NO_SET : ACTIVE;
 }
 
@@ -96,6 +98,7 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, uint32_t flags,
                    const flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS], int late) {
   static flexcomp_real last_command_rad[FLEXCOMP_JOINTS];
   static uint32_t last_start_ticks;
+  static uint32_t settling_cycles;
   static const figures nothing;
   const uint32_t number = cycle_number + 1;
   sample* s = &waiting[number % DELAY];
@@ -109,6 +112,11 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, uint32_t flags,
   s->cycle = number;
   s->ticks = end_ticks - start_ticks;
   s->flags = flags;
+  /* In the cycle in which the offset becomes 0 the flag is not set any more, and one later its motion has ended. */
+  if ((flags & FLEXCOMP_FLAG_SETTLING) != 0) settling_cycles = 3;
+  s->settling = settling_cycles != 0;
+  if (settling_cycles != 0) --settling_cycles;
+  recorded.flags = flags;
   s->loaded = (int32_t)(loaded_until - number) > 0;
   s->standing = 1;
   for (unsigned j = 0; j < FLEXCOMP_JOINTS; ++j) {
@@ -205,7 +213,8 @@ size_t monitor_report(char* to, size_t size) {
   put_number(&t, ", \"late\": ", (int32_t)f.late);
   put_number(&t, ", \"interval_ticks\": [", (int32_t)f.least_interval_ticks);
   put_number(&t, ", ", (int32_t)f.most_interval_ticks);
-  put_angles(&t, "], \"command_nrad\": ", f.command_rad);
+  put_number(&t, "], \"flags\": ", (int32_t)f.flags);
+  put_angles(&t, ", \"command_nrad\": ", f.command_rad);
   put_angles(&t, ", \"correction_nrad\": ", f.correction_rad);
   for (int c = 0; c < CLASSES; ++c) {
     put(&t, ", \"");

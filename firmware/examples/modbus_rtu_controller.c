@@ -92,6 +92,8 @@ int main(void) {
   flexcomp_settings settings;
   flexcomp_settings_default(&settings);
   settings.cycle_us = BOARD_CYCLE_US;
+  /* Slow, so that a change of set sees the whole path. */
+  settings.offset_rate_rad_s = (flexcomp_real)0.003;
 
   board_init();
   arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, &settings, board_storage);
