@@ -26,14 +26,14 @@ void count(std::atomic<std::uint32_t>& n) {
 
 Scalar sensible(Scalar v) { return is_finite(v) && v > Scalar(0) ? v : Scalar(0); }
 
-ControlSettings sensible(ControlSettings s) {
+FLEXCOMP_RARE ControlSettings sensible(ControlSettings s) {
   s.compensation.largest_correction_rad = sensible(s.compensation.largest_correction_rad);
   s.direction_band_rad = sensible(s.direction_band_rad);
   return s;
 }
 
 // No wider than sines and cosines reach, as in the model: a command beyond that is refused.
-Joints limits_of(const Robot& robot, bool upper) {
+FLEXCOMP_RARE Joints limits_of(const Robot& robot, bool upper) {
   Joints limits;
   for (std::size_t j = 0; j < joints; ++j) {
     limits[j] = from_binary64<Scalar>(upper ? robot.limits[j].max_rad : robot.limits[j].min_rad);
@@ -48,7 +48,7 @@ constexpr std::uint16_t event_flags =
 
 }  // namespace
 
-ContextSensitivity sensitivity_of(const FirmwareModel& model) {
+FLEXCOMP_RARE ContextSensitivity sensitivity_of(const FirmwareModel& model) {
   ContextSensitivity bound;
   Scalar other = Scalar(0);  // compliance to the torque of another joint, or of another slot
   for (std::size_t k = 0; k < model.effect_count(); ++k) {
@@ -117,7 +117,7 @@ void ControlCycle::track(const Joints& q) {
   }
 }
 
-bool ControlCycle::is_within_limits(const Joints& q) const {
+FLEXCOMP_RARE bool ControlCycle::is_within_limits(const Joints& q) const {
   for (std::size_t j = 0; j < joints; ++j) {
     if (!(q[j] >= lower_[j] && q[j] <= upper_[j])) return false;
   }

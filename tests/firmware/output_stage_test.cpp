@@ -46,7 +46,7 @@ class OutputStageTest : public testing::Test {
 };
 
 using Scalars = testing::Types<double, float>;
-TYPED_TEST_SUITE(OutputStageTest, Scalars);
+TYPED_TEST_SUITE(OutputStageTest, Scalars, );
 
 TYPED_TEST(OutputStageTest, PassesOnWhatIsWantedToTheLastBit) {
   auto stage = this->stage();
@@ -119,7 +119,7 @@ TYPED_TEST(OutputStageTest, AnOffsetReturnsStraightAndStopsExactly) {
     }
     EXPECT_EQ(out, wanted);
     // 0.05 rad at 0.5 rad/s, and 0.5/20 s for starting and stopping.
-    EXPECT_NEAR(cycles * cycle_us * 1e-6, 0.05 / 0.5 + 0.5 / 20, 0.005 + 3e-6 * cycle_us);
+    EXPECT_NEAR(cycles * (1e-6 * cycle_us), 0.05 / 0.5 + 0.5 / 20, 0.005 + 3e-6 * cycle_us);
   }
 }
 
@@ -187,7 +187,8 @@ TYPED_TEST(OutputStageTest, EveryBoundHoldsInEveryCycle) {
       const bool refused = this->one_in(300);
       if (refused) {
         auto broken = q;
-        broken[k % 6] = k % 2 != 0 ? std::numeric_limits<S>::quiet_NaN() : std::numeric_limits<S>::infinity();
+        broken[static_cast<std::size_t>(k % 6)] =
+            k % 2 != 0 ? std::numeric_limits<S>::quiet_NaN() : std::numeric_limits<S>::infinity();
         stage.hold(broken, out);
         if (!first) {
           ASSERT_EQ(out, last_out);

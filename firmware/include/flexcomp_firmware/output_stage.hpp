@@ -14,6 +14,13 @@
 #include "flexcomp/detail/compiler.hpp"
 #include "flexcomp/status.hpp"
 
+/// For what runs at the start or for some cycles after an event: small rather than fast.
+#if defined(__GNUC__)
+#define FLEXCOMP_RARE __attribute__((noinline, cold))
+#else
+#define FLEXCOMP_RARE
+#endif
+
 namespace flexcomp {
 namespace firmware {
 
@@ -42,8 +49,8 @@ class OutputStage {
 
   /// Bounds that are not finite or not above 0 are replaced by the defaults, a cycle of 0 by 1 us. The limits
   /// are finite, lower <= upper; largest_correction_rad is at least 0.
-  OutputStage(const Angles& lower_rad, const Angles& upper_rad, S largest_correction_rad,
-              const MotionBounds<S, N>& bounds)
+  FLEXCOMP_RARE OutputStage(const Angles& lower_rad, const Angles& upper_rad, S largest_correction_rad,
+                            const MotionBounds<S, N>& bounds)
       : lower_(lower_rad), upper_(upper_rad), largest_(largest_correction_rad) {
     const MotionBounds<S, N> usual;
     const S cycle = static_cast<S>(bounds.cycle_us != 0 ? bounds.cycle_us : 1U) * S(1e-6);
@@ -103,7 +110,7 @@ class OutputStage {
 
   /// One cycle with a command that is not used: the last output again. Before the first command that was
   /// used: the command's finite joints as they are, and where there has been none 0, within the joint limits.
-  void hold(const Angles& q_command_rad, Angles& q_rad) {
+  FLEXCOMP_RARE void hold(const Angles& q_command_rad, Angles& q_rad) {
     if (state_ == State::idle) {
       for (std::size_t j = 0; j < N; ++j) {
         if (is_finite(q_command_rad[j])) output_[j] = q_command_rad[j];
@@ -140,7 +147,7 @@ class OutputStage {
     following
   };
 
-  FLEXCOMP_ONCE std::uint16_t follow_bounded(const Angles& q_command_rad, bool event, Angles& q_rad) {
+  FLEXCOMP_RARE std::uint16_t follow_bounded(const Angles& q_command_rad, bool event, Angles& q_rad) {
     std::uint16_t flags = 0;
     const bool resumed = state_ != State::following;
     if (resumed && !resume(q_command_rad, q_rad)) return step_flag::refused;

@@ -26,6 +26,8 @@ ENOUGH_CYCLES = 900
 SETTLING = 32  # the flag
 # What a change of set may add to a joint's command in a cycle of 1 ms: the image sets 3 mrad/s.
 OFFSET_NRAD = 3000
+# Of sensitivity_of() for such a set (firmware/src/control.cpp), in the cycle that takes it over.
+SENSITIVITY_INSTRUCTIONS = 700
 # As `identify` makes a set (geometry, compliance, gravity), and with eleven kinds of effect, also such as move more than
 # the joints: the step goes different ways for them.
 SETS = {
@@ -159,15 +161,18 @@ def undisturbed(report, shift):
         print("  %-12s             %8.0f … %-8.0f %8.0f … %-8.0f %6d, %d" % (
             state, a * instructions, b * instructions, x * instructions, y * instructions, idle["cycles"], loaded["cycles"]))
         if state == "changing":
-            # Taking a set over costs some instructions once, and the bus has always just been heard: no more than
-            # the largest of the rest with its margin.
-            check(loaded["cycles"] >= 6 and y <= 1.01 * most + 1, "nor where the set changes hands", y, most)
+            # Taking a set over costs some instructions once, with the bound of its sensitivity to the load some 300, and
+            # the bus has always just been heard: no more than the largest of the rest with that margin.
+            check(loaded["cycles"] >= 6 and y <= 1.01 * most + 1 + SENSITIVITY_INSTRUCTIONS / instructions,
+                  "nor where the set changes hands", y, most)
             continue
         most = max(most, b)
-        # One tick is what the counter cannot tell.
+        # One tick is what the counter cannot tell. Without a set the work is mostly that of the offset's return, whose
+        # branches (some 20 instructions of 1,150) differ from change to change.
+        margin = 0.03 if state == "settling_out" else 0.01
         for quiet, busy in ((a, x), (b, y)):
-            check(abs(busy - quiet) <= 0.01 * quiet + 1, f"{state}: within 1 % of an idle bus", quiet, busy)
-    passed("the instruction count of the step under load is within 1 % of that with an idle bus, in every state")
+            check(abs(busy - quiet) <= margin * quiet + 1, f"{state}: as with an idle bus", quiet, busy)
+    passed("the instruction count of the step under load is within 1 % of that with an idle bus; 3 % while a set settles out")
 
     check(report["late"] == 0, "no cycle is late", report["late"])
     check(all(abs(t - CYCLE_TICKS) <= CYCLE_TICKS // 100 for t in report["interval_ticks"]), "nor does one begin late",
