@@ -24,18 +24,22 @@
 namespace flexcomp {
 namespace firmware {
 
+/// An array of one value.
+template <class S, std::size_t N>
+constexpr std::array<S, N> all_equal(S value) {
+  std::array<S, N> out{};
+  for (std::size_t j = 0; j < N; ++j) out[j] = value;
+  return out;
+}
+
 /// Bounds of the motion that a correction adds to a command (C19, C20).
 template <class S, std::size_t N = 6>
 struct MotionBounds {
   /// Rate of each joint's correction, rad/s. Ordinary programs stay below 0.6 away from singularities.
-  std::array<S, N> correction_rate_rad_s;
+  std::array<S, N> correction_rate_rad_s = all_equal<S, N>(S(2));
   S offset_rate_rad_s = S(0.5);          ///< of the offset that an event leaves
   S offset_acceleration_rad_s2 = S(20);  ///< of the same
   std::uint32_t cycle_us = 1000;         ///< period of the control cycle, at least 1
-
-  MotionBounds() {
-    for (S& rate : correction_rate_rad_s) rate = S(2);
-  }
 };
 
 /// Adds to every command q_c the correction c that follows the wanted one within bounds of motion. An event
@@ -54,7 +58,6 @@ class OutputStage {
       : lower_(lower_rad), upper_(upper_rad), largest_(largest_correction_rad) {
     const MotionBounds<S, N> usual;
     const S cycle = static_cast<S>(bounds.cycle_us != 0 ? bounds.cycle_us : 1U) * S(1e-6);
-    const auto sensible = [](S v, S otherwise) { return is_finite(v) && v > S(0) ? v : otherwise; };
     for (std::size_t j = 0; j < N; ++j) {
       rate_[j] = sensible(bounds.correction_rate_rad_s[j], usual.correction_rate_rad_s[j]) * cycle;
       output_[j] = S(0);
@@ -140,6 +143,8 @@ class OutputStage {
   }
 
  private:
+  FLEXCOMP_RARE static S sensible(S v, S otherwise) { return is_finite(v) && v > S(0) ? v : otherwise; }
+
   enum class State : std::uint8_t {
     idle,      ///< no command has been used
     standing,  ///< at output_, until a command comes near
