@@ -92,7 +92,7 @@ TEST(Motion, EveryBoundHoldsInEveryCycle) {
   const double limit = static_cast<double>(real(2.2));
   RandomPath path(2019);
   std::array<std::uint64_t, step_flag::count> seen{};
-  std::uint64_t ok = 0, compared = 0, refused_by_core = 0;
+  std::uint64_t ok = 0, compared = 0;
   double fastest_offset = 0, hardest_offset = 0, fastest_correction = 0;
   long done = 0;
   Flash flash;
@@ -170,28 +170,11 @@ TEST(Motion, EveryBoundHoldsInEveryCycle) {
         held = true;
         continue;
       }
-      if (is_context_finite && (r.flags & step_flag::refused) != 0 && !(told && first)) {
-        // The core refuses what would grow beyond all bounds: in single precision at some singular pose of
-        // 10^8. The output holds as for any other refused command, or returns to the command.
-        FirmwareContext tracked = context;
-        for (std::size_t j = 0; j < joints; ++j) tracked.direction[j] = device.cycle().direction(j);
-        if (device.status().state == 0) {
-          const Bytes image = arm.pull();
-          ASSERT_EQ(model_from_image(image.data(), image.size(), robot, *model), Refusal::none);
-          ASSERT_EQ(compensate(*model, q, tracked).status, StepStatus::refused);
-        }
-        std::printf("refused by the core: %.9g %.9g %.9g %.9g %.9g %.9g\n", static_cast<double>(q[0]),
-                    static_cast<double>(q[1]), static_cast<double>(q[2]), static_cast<double>(q[3]),
-                    static_cast<double>(q[4]), static_cast<double>(q[5]));
-        ++refused_by_core;
-        if (settings.control.on_refusal == OnRefusal::hold) {
-          ASSERT_TRUE(first || r.q == last);
-          held = true;
-          continue;
-        }
+      const bool is_far = told && first && distance(standing, q) > static_cast<double>(real(0.1));
+      if (is_context_finite) {
+        ASSERT_EQ((r.flags & step_flag::refused) != 0, is_far) << "a good command, at " << done;
       }
-      if (is_context_finite && (r.flags & step_flag::refused) != 0 && told && first) {
-        // Far from where the arm stands.
+      if (is_far) {
         ASSERT_EQ(r.q, standing);
         if (path.one_in(50)) {
           // Begun anew where the command is.
@@ -248,7 +231,6 @@ TEST(Motion, EveryBoundHoldsInEveryCycle) {
   EXPECT_LE(fastest_offset, 1 + 16 * ulp);
   EXPECT_LE(hardest_offset, 1 + 4096 * ulp);
   EXPECT_GT(ok, 0U);
-  EXPECT_LE(refused_by_core, static_cast<std::uint64_t>(done / 10000000));
   EXPECT_GT(compared, 0U);
   std::printf("%ld cycles, %llu ok, %llu compared with the core", done, static_cast<unsigned long long>(ok),
               static_cast<unsigned long long>(compared));
