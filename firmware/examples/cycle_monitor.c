@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "cycle_monitor.h"
 
-/* What a cycle was: without a set, with one, fading from one to the next, fading out to none. Kept apart are those
+/* What a cycle was: without a set, with one, settling after a change to another one, settling after one to none. Kept apart are those
  * that took another set over, which costs them some instructions once, and those beside them of which the outside
  * cannot tell on which side of the change they were. */
-enum { NO_SET, ACTIVE, FADING, FADING_OUT, CHANGING, CLASSES };
-static const char* const class_names[CLASSES] = {"no_set", "active", "fading", "fading_out", "changing"};
+enum { NO_SET, ACTIVE, SETTLING, SETTLING_OUT, CHANGING, CLASSES };
+static const char* const class_names[CLASSES] = {"no_set", "active", "settling", "settling_out", "changing"};
 
 /* Whether the bus was heard or the parameter store was at work a moment ago. */
 enum { IDLE, LOADED, LOADS };
@@ -29,6 +29,7 @@ typedef struct figures {
   uint32_t late;
   uint32_t least_interval_ticks;
   uint32_t most_interval_ticks;
+  uint32_t flags;
   flexcomp_real command_rad[FLEXCOMP_JOINTS];
   flexcomp_real correction_rad[FLEXCOMP_JOINTS];
   step_figures steps[CLASSES][LOADS];
@@ -43,7 +44,8 @@ static figures recorded;
 typedef struct sample {
   uint32_t cycle;
   uint32_t ticks;
-  flexcomp_status status;
+  uint32_t flags;
+  int settling;
   int loaded;
   int standing;
   flexcomp_real correction_rad[FLEXCOMP_JOINTS];
@@ -59,19 +61,17 @@ static volatile uint32_t clear_wanted;
 static volatile uint32_t change_after = 0xC0000000U;
 static volatile uint32_t change_until = 0xC0000000U;
 static volatile uint32_t loaded_until = 0;
-static uint32_t fade_cycles_set;
 
 /* --- cycle --------------------------------------------------------------------------------------- */
 
 static int class_of(const sample* s) {
-  /* The set was taken in one of the cycles change_after + 1 … change_until + 1 and faded in from there on. */
+  /* The set was taken in one of the cycles change_after + 1 … change_until + 1. */
   const int32_t since_first = (int32_t)(s->cycle - change_after) - 1;
   const int32_t since_last = (int32_t)(s->cycle - change_until) - 1;
-  const int32_t fade = (int32_t)fade_cycles_set;
-  const int none = s->status == FLEXCOMP_NO_SET;
-  if (since_last >= fade) return none ? NO_SET : ACTIVE;
-  if (since_last > 0 && since_first < fade) return none ? FADING_OUT : FADING;
-  return CHANGING;
+  const int none = (s->flags & FLEXCOMP_FLAG_NO_SET) != 0;
+  if (since_first >= 0 && since_last <= 0) return CHANGING;
+  if (s->settling) return none ? SETTLING_OUT : SETTLING;
+  return none ? NO_SET : ACTIVE;
 }
 
 static void raise_to(flexcomp_real* largest, flexcomp_real v) {
@@ -93,11 +93,12 @@ static void file(const sample* s) {
   }
 }
 
-void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status status,
+void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, uint32_t flags,
                    const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
                    const flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS], int late) {
   static flexcomp_real last_command_rad[FLEXCOMP_JOINTS];
   static uint32_t last_start_ticks;
+  static uint32_t settling_cycles;
   static const figures nothing;
   const uint32_t number = cycle_number + 1;
   sample* s = &waiting[number % DELAY];
@@ -110,7 +111,12 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status sta
 
   s->cycle = number;
   s->ticks = end_ticks - start_ticks;
-  s->status = status;
+  s->flags = flags;
+  /* In the cycle in which the offset becomes 0 the flag is not set any more, and one later its motion has ended. */
+  if ((flags & FLEXCOMP_FLAG_SETTLING) != 0) settling_cycles = 3;
+  s->settling = settling_cycles != 0;
+  if (settling_cycles != 0) --settling_cycles;
+  recorded.flags = flags;
   s->loaded = (int32_t)(loaded_until - number) > 0;
   s->standing = 1;
   for (unsigned j = 0; j < FLEXCOMP_JOINTS; ++j) {
@@ -140,8 +146,6 @@ void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status sta
 /* --- background ---------------------------------------------------------------------------------- */
 
 static uint32_t number_before_poll;
-
-void monitor_init(uint32_t fade_cycles) { fade_cycles_set = fade_cycles; }
 
 void monitor_bus_heard(void) { loaded_until = cycle_number + LOAD_LASTS_CYCLES; }
 
@@ -209,7 +213,8 @@ size_t monitor_report(char* to, size_t size) {
   put_number(&t, ", \"late\": ", (int32_t)f.late);
   put_number(&t, ", \"interval_ticks\": [", (int32_t)f.least_interval_ticks);
   put_number(&t, ", ", (int32_t)f.most_interval_ticks);
-  put_angles(&t, "], \"command_nrad\": ", f.command_rad);
+  put_number(&t, "], \"flags\": ", (int32_t)f.flags);
+  put_angles(&t, ", \"command_nrad\": ", f.command_rad);
   put_angles(&t, ", \"correction_nrad\": ", f.correction_rad);
   for (int c = 0; c < CLASSES; ++c) {
     put(&t, ", \"");

@@ -10,13 +10,11 @@
 extern "C" {
 #endif
 
-/* CYCLE: one step, between two readings of board_ticks(). `late`: the next cycle was due before the end. */
-void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, flexcomp_status status,
+/* CYCLE: one step with its flags, between two readings of board_ticks(). `late`: the next cycle was due before the end. */
+void monitor_cycle(uint32_t start_ticks, uint32_t end_ticks, uint32_t flags,
                    const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
                    const flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS], int late);
 
-/* BACKGROUND: before the control cycle starts. */
-void monitor_init(uint32_t fade_cycles);
 /* BACKGROUND: around each flexcomp_poll, because a set changes hands in there. */
 void monitor_before_poll(void);
 void monitor_after_poll(const flexcomp_state* state);

@@ -77,7 +77,8 @@ int main(void) {
   if (flexcomp_boot(arm) != 0) return 2; /* no set: a real controller goes on and passes commands through */
 
   for (joint = 0; joint < FLEXCOMP_JOINTS; ++joint) planned_rad[joint] = tx60l_command_rad[joint];
-  /* 1 kHz for two seconds. The set is faded in during the first (settings: fade_cycles). */
+  /* 1 kHz for two seconds. The correction starts at 0 and is the set's after some hundredths of a second; a real arm
+   * tells where it stands by flexcomp_start and does not move at all. */
   for (cycle = 0; cycle < 2000; ++cycle) {
     status = control_cycle(planned_rad, drive_rad);
     if (cycle % 10 == 0) background(cycle);

@@ -16,8 +16,7 @@ static flexcomp_arm* arm;
 
 /* --- the control cycle --------------------------------------------------------------------------- */
 
-/* Where a robot has its path planner: the arm goes from one pose to another and back, smoothly, once in PATH_CYCLES
- * (the time of a fade-in, so that each fade sees the whole path). */
+/* Where a robot has its path planner: the arm goes from one pose to another and back, smoothly, once in PATH_CYCLES. */
 enum { PATH_CYCLES = 1000 };
 static const flexcomp_real from_rad[FLEXCOMP_JOINTS] = {-0.35, -0.30, 1.20, -0.40, 0.70, -0.50};
 static const flexcomp_real to_rad[FLEXCOMP_JOINTS] = {0.35, 0.25, 1.60, 0.40, 1.10, 0.50};
@@ -40,12 +39,12 @@ static void control_cycle(void) {
   plan_command(q_command_rad);
 
   const uint32_t start = board_ticks();
-  const flexcomp_status status = flexcomp_step(arm, q_command_rad, NULL, q_corrected_rad);
+  flexcomp_step(arm, q_command_rad, NULL, q_corrected_rad);
   const uint32_t end = board_ticks();
 
   /* Here q_corrected_rad goes to the drives. */
 
-  monitor_cycle(start, end, status, q_command_rad, q_corrected_rad, board_cycle_is_late());
+  monitor_cycle(start, end, flexcomp_step_flags(arm), q_command_rad, q_corrected_rad, board_cycle_is_late());
 }
 
 /* --- the background ------------------------------------------------------------------------------ */
@@ -93,6 +92,8 @@ int main(void) {
   flexcomp_settings settings;
   flexcomp_settings_default(&settings);
   settings.cycle_us = BOARD_CYCLE_US;
+  /* Slow, so that a change of set sees the whole path. */
+  settings.offset_rate_rad_s = (flexcomp_real)0.003;
 
   board_init();
   arm = flexcomp_init(&memory, sizeof memory, &staubli_tx60l, &settings, board_storage);
@@ -101,7 +102,6 @@ int main(void) {
   flexcomp_rtu* rtu =
       flexcomp_rtu_init(&rtu_memory, sizeof rtu_memory, arm, UNIT, board_bus_gap_us(), send_to_bus, NULL);
   if (rtu == NULL) return 1;
-  monitor_init(settings.fade_cycles);
   board_start_cycle(control_cycle);
 
   for (;;) {

@@ -7,28 +7,29 @@
  *     static flexcomp_memory memory;                                 1. memory for one arm
  *     flexcomp_arm *fc = flexcomp_init(&memory, sizeof memory, &robot, NULL, &storage);
  *     flexcomp_boot(fc);                                             2. load the stored set, before the cycle
- *     status = flexcomp_step(fc, q_command, &context, q_corrected);  3. CYCLE: correct every joint command
- *     flexcomp_poll(fc, now_ms);                                     4. BACKGROUND: every 10 ms or so
- *     flexcomp_can_receive(can, id, bytes, size);                    5. BACKGROUND: frames of a bus
+ *     flexcomp_start(fc, q_standing);                                3. where the arm stands: nothing moves
+ *     status = flexcomp_step(fc, q_command, &context, q_corrected);  4. CYCLE: correct every joint command
+ *     flexcomp_poll(fc, now_ms);                                     5. BACKGROUND: every 10 ms or so
+ *     flexcomp_can_receive(can, id, bytes, size);                    6. BACKGROUND: frames of a bus
  *
  * `robot` is a constant that `flexcomp export` writes, `storage` three functions for two slots of flash.
  * firmware/examples has whole controllers, docs/firmware.md the steps one by one.
  *
  * How it works. The control cycle gives a joint command and gets back the command at which the flexible arm
  * has the pose that the nominal arm would have (docs/compensation.md). Parameter sets arrive over CANopen or
- * Modbus, are verified, stored in two slots of non-volatile memory and faded in.
+ * Modbus, are verified, stored in two slots of non-volatile memory and taken over by a bounded motion.
  *
  * Memory. All of it is the caller's: one block per object, of the size that a constant names, aligned to 8
  * bytes (flexcomp_memory and its like are such blocks). Nothing is allocated, nothing is static. A block is
  * in use from the init that was given it for as long as any call names the object; another init reuses it,
  * and there is nothing to release.
  *
- * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step and
- * nothing else; it may interrupt the other one at any point and never waits. The BACKGROUND context (main
- * loop, or one thread) calls everything else; two calls of it must not overlap. Hooks are called in the
- * background, from within the call that needs them; they must not call back into the library. Two arms share
- * nothing: each has a cycle and a background of its own. A call for ANY context touches nothing but its
- * arguments.
+ * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step,
+ * with flexcomp_step_flags, and flexcomp_start where it begins anew, and nothing else; it may interrupt the
+ * other one at any point and never waits. The BACKGROUND context (main loop, or one thread) calls everything
+ * else; two calls of it must not overlap. Hooks are called in the background, from within the call that needs
+ * them; they must not call back into the library. Two arms share nothing: each has a cycle and a background
+ * of its own. A call for ANY context touches nothing but its arguments.
  *
  * Time. Every call ends after work that is bounded on any input; no call waits, sleeps or takes a lock. The
  * bound stands with each call, in these measures:
@@ -144,8 +145,10 @@ void flexcomp_robot_default(flexcomp_robot* robot);
 
 /** Output for a command that cannot be corrected (docs/compensation.md, section 8). */
 typedef enum flexcomp_on_refusal {
-  FLEXCOMP_PASS_THROUGH = 0,        /**< the correction fades out to zero */
-  FLEXCOMP_HOLD_LAST_CORRECTION = 1 /**< the last correction is added to the command */
+  /** A command within the joint limits, whose context is not finite, while the correction returns to 0; any
+   * other is held as by the next one. */
+  FLEXCOMP_PASS_THROUGH = 0,
+  FLEXCOMP_HOLD_LAST_OUTPUT = 1 /**< the last output stands */
 } flexcomp_on_refusal;
 
 /** Settings of an arm. */
@@ -154,15 +157,20 @@ typedef struct flexcomp_settings {
   flexcomp_real direction_band_rad;        /**< motion after which a joint counts as reversed */
   flexcomp_real plausible_position_m;      /**< a set that moves the tool farther is refused */
   flexcomp_real plausible_orientation_rad; /**< the same for its orientation, below pi / 2 */
-  uint32_t fade_cycles;                    /**< control cycles over which a set is faded in */
-  uint32_t trial_cycles;                   /**< control cycles of a trial that names none */
-  uint32_t staging_timeout_ms;             /**< after which an abandoned transfer is dropped */
-  uint32_t cycle_us;                       /**< period of the control cycle, told to clients */
-  flexcomp_on_refusal on_refusal;          /**< output for a command that cannot be corrected */
+  /** Greatest rate of each joint's correction. */
+  flexcomp_real correction_rate_rad_s[FLEXCOMP_JOINTS];
+  /** Greatest rate at which the offset that an event leaves (another set, a jump of the load) returns to
+   * 0. */
+  flexcomp_real offset_rate_rad_s;
+  flexcomp_real offset_acceleration_rad_s2; /**< greatest acceleration of the same */
+  uint32_t trial_cycles;                    /**< control cycles of a trial that names none */
+  uint32_t staging_timeout_ms;              /**< after which an abandoned transfer is dropped */
+  uint32_t cycle_us;                        /**< period of the control cycle: rates are bounded by it */
+  flexcomp_on_refusal on_refusal;           /**< output for a command that cannot be corrected */
 } flexcomp_settings;
 
-/** Sets the defaults: 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 1000, 60000, 30000 ms, 1000 us,
- * FLEXCOMP_PASS_THROUGH. ANY context; small. */
+/** Sets the defaults: 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 2 rad/s, 0.5 rad/s, 20 rad/s^2, 60000, 30000 ms,
+ * 1000 us, FLEXCOMP_HOLD_LAST_OUTPUT. ANY context; small. */
 void flexcomp_settings_default(flexcomp_settings* settings);
 
 /* --- non-volatile memory ------------------------------------------------------------------------- */
@@ -193,9 +201,9 @@ typedef struct flexcomp_storage {
 
 /** Builds an arm in `memory`. `settings` and `storage` may be NULL: defaults, and no non-volatile memory. All
  * is copied. NULL where the memory is too small or misaligned, or the robot is not valid: a number that is
- * not finite, crossed limits, a quaternion off norm 1 by more than 1e-3, no name. BACKGROUND, before the
- * cycle starts; the hashes of robot and name, and clearing the memory: a few instructions per byte of it. No
- * hook. */
+ * not finite, crossed limits, a quaternion off norm 1 by more than 1e-3, no name; or a period, a rate or an
+ * acceleration of the settings is not above 0. BACKGROUND, before the cycle starts; the hashes of robot and
+ * name, and clearing the memory: a few instructions per byte of it. No hook. */
 flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
                             const flexcomp_settings* settings, const flexcomp_storage* storage);
 
@@ -219,25 +227,59 @@ typedef struct flexcomp_context {
  * time: what it reads never changes after init. Small. */
 void flexcomp_context_default(const flexcomp_arm* fc, flexcomp_context* context);
 
-/** Result of a step (docs/compensation.md, C17). */
+/** Where the arm stands, rad: the output of every step until a command lies within the largest correction of
+ * it (before that, steps are refused). That command is taken up without any motion, and the correction goes
+ * from there to the set's as after any event. Without this call it starts at 0: the first output is the first
+ * command, and the arm then moves by the correction. 0 where a number is not finite or beyond a joint limit:
+ * nothing is changed. Before the first step, or in the CYCLE context to begin anew; small. */
+int flexcomp_start(flexcomp_arm* fc, const flexcomp_real q_standing_rad[FLEXCOMP_JOINTS]);
+
+/** Result of a step: the first that holds of refused, no_set, at_limit, limited, near_singular, ok
+ * (docs/compensation.md, section 8). All of them are in flexcomp_step_flags(). */
 typedef enum flexcomp_status {
   FLEXCOMP_OK = 0,            /**< corrected */
   FLEXCOMP_NEAR_SINGULAR = 1, /**< corrected, damped: what remains is orientation before position */
-  FLEXCOMP_LIMITED = 2,       /**< the correction was scaled to the largest one allowed */
+  FLEXCOMP_LIMITED = 2,       /**< the correction is scaled, follows at its greatest rate, or settles */
   FLEXCOMP_AT_LIMIT = 3,      /**< a corrected joint is at its limit */
-  FLEXCOMP_NO_SET = 4,        /**< no parameter set: the command is passed through */
+  FLEXCOMP_NO_SET = 4,        /**< no parameter set: the command as it is, once a former set's has settled */
   FLEXCOMP_REFUSED = 5        /**< not finite or beyond a limit; see flexcomp_on_refusal */
 } flexcomp_status;
 
 /** One control cycle (C1, C18 to C20): joint command (rad) in, corrected joint command (rad) out; they may be
  * one array. `context` may be NULL: the default one. Directions of motion are tracked from the commands.
- * Where a set changes, the command moves by at most 1.5 / fade_cycles of the difference per cycle. CYCLE:
- * from one interrupt or thread, at any time after init; may interrupt every other call of this header.
+ *
+ * The output is finite and within the joint limits, whatever comes in. The correction changes by no more per
+ * cycle than correction_rate_rad_s allows, and does not jump at an event: a new set, a jump of payload,
+ * centre of mass, force or temperature, a limit, a refusal; there the difference returns to 0 at the offset's
+ * rate and acceleration. A refused command (not finite, beyond a joint limit, with a context that is not
+ * finite) gives the last output again, or what flexcomp_on_refusal says. The next command that is used is
+ * reached from there as after any event: a controller that sees FLEXCOMP_REFUSED stops the program, or the
+ * arm catches up with it on a path of its own. Until the first command that is used (and without
+ * flexcomp_start) a refused command goes out joint by joint as far as it is finite, a joint that never was as
+ * 0 or its nearest limit: do not enable the drives before that.
+ *
+ * CYCLE: from one interrupt or thread, at any time after init; may interrupt every other call of this header.
  * Bounded work on any input, no hook, no waiting: a fixed number of passes of the model; small where there is
  * no set. */
 flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]);
+
+/** Bits of flexcomp_step_flags(). Numbers are on the wire: they are added to, never changed. */
+typedef enum flexcomp_step_flag {
+  FLEXCOMP_FLAG_REFUSED = 1,        /**< the command or its context was not used */
+  FLEXCOMP_FLAG_NO_SET = 2,         /**< no valid parameter set */
+  FLEXCOMP_FLAG_AT_LIMIT = 4,       /**< a corrected joint is at its limit */
+  FLEXCOMP_FLAG_LIMITED = 8,        /**< the correction was scaled to the largest one allowed */
+  FLEXCOMP_FLAG_RATE_LIMITED = 16,  /**< the correction follows at its greatest rate */
+  FLEXCOMP_FLAG_SETTLING = 32,      /**< the difference that an event left has not returned to 0 yet */
+  FLEXCOMP_FLAG_NOT_CONVERGED = 64, /**< the last iterate was still above its tolerance */
+  FLEXCOMP_FLAG_NEAR_SINGULAR = 128 /**< damped or scaled near a singularity */
+} flexcomp_step_flag;
+
+/** All that held the last step back, bits of flexcomp_step_flag; 0 where the output is the corrected command
+ * and the status FLEXCOMP_OK. BOTH contexts; small. */
+uint32_t flexcomp_step_flags(const flexcomp_arm* fc);
 
 /** Background work of the store: writing a slot, trials, timeouts. Every 10 ms or so; a commit of n bytes
  * takes about n / 256 + 3 polls. now_ms is any clock that wraps at 32 bits. BACKGROUND; small, and at most

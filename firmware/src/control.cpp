@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "flexcomp_firmware/control.hpp"
 
+#include <cmath>
 #include <cstring>
 
 #include "flexcomp/bounds.hpp"
@@ -25,17 +26,63 @@ void count(std::atomic<std::uint32_t>& n) {
 
 Scalar sensible(Scalar v) { return is_finite(v) && v > Scalar(0) ? v : Scalar(0); }
 
+FLEXCOMP_RARE ControlSettings sensible(ControlSettings s) {
+  s.compensation.largest_correction_rad = sensible(s.compensation.largest_correction_rad);
+  s.direction_band_rad = sensible(s.direction_band_rad);
+  return s;
+}
+
+// No wider than sines and cosines reach, as in the model: a command beyond that is refused.
+FLEXCOMP_RARE Joints limits_of(const Robot& robot, bool upper) {
+  Joints limits;
+  for (std::size_t j = 0; j < joints; ++j) {
+    limits[j] = from_binary64<Scalar>(upper ? robot.limits[j].max_rad : robot.limits[j].min_rad);
+    clamp_to(limits[j], -LargestAngle<Scalar>::value(), LargestAngle<Scalar>::value());
+  }
+  return limits;
+}
+
+// Where one of these comes or goes, the wanted correction may jump.
+constexpr std::uint16_t event_flags =
+    step_flag::refused | step_flag::no_set | step_flag::at_limit | step_flag::limited;
+
 }  // namespace
 
-ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings)
-    : sets_(sets), settings_(settings) {
-  settings_.compensation.largest_correction_rad = sensible(settings.compensation.largest_correction_rad);
-  settings_.direction_band_rad = sensible(settings.direction_band_rad);
-  for (std::size_t j = 0; j < joints; ++j) {
-    lower_[j] = from_binary64<Scalar>(robot.limits[j].min_rad);
-    upper_[j] = from_binary64<Scalar>(robot.limits[j].max_rad);
+FLEXCOMP_RARE ContextSensitivity sensitivity_of(const FirmwareModel& model) {
+  ContextSensitivity bound;
+  Scalar other = Scalar(0);  // compliance to the torque of another joint, or of another slot
+  for (std::size_t k = 0; k < model.effect_count(); ++k) {
+    const Term<Scalar>& t = model.effect(k);
+    if (t.basis == Basis::thermal) bound.rad_per_k += std::fabs(t.coefficient);
+    if (t.basis == Basis::load_torque && (t.place.slot != slot::theta || t.place.body != t.joint + 1U))
+      other += std::fabs(t.coefficient);
   }
-  if (settings_.fade_cycles != 0) fade_step_ = Scalar(1) / static_cast<Scalar>(settings_.fade_cycles);
+  Scalar com = Scalar(0);
+  Scalar reach = Scalar(0);
+  for (int k = 0; k < 3; ++k) {
+    com += std::fabs(from_binary64<Scalar>(model.robot().payload_com_m[static_cast<std::size_t>(k)]));
+    reach += std::fabs(model.nominal_tool().position[k]);
+  }
+  const Scalar gravity = std::sqrt(dot<Scalar>(model.gravity(), model.gravity()));
+  for (std::size_t i = joints; i-- > 0;) {
+    reach += std::fabs(model.nominal(i).d) + std::fabs(model.nominal(i).a);
+    const Scalar compliance = std::fabs(model.plan().compliance(i)) + other;
+    const Scalar per_n = compliance * reach;
+    const Scalar per_kg = compliance * (reach + com) * gravity;
+    const Scalar per_kg_m = compliance * gravity;
+    if (per_n > bound.rad_per_n) bound.rad_per_n = per_n;
+    if (per_kg > bound.rad_per_kg) bound.rad_per_kg = per_kg;
+    if (per_kg_m > bound.rad_per_kg_m) bound.rad_per_kg_m = per_kg_m;
+  }
+  return bound;
+}
+
+ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings)
+    : sets_(sets),
+      settings_(sensible(settings)),
+      lower_(limits_of(robot, false)),
+      upper_(limits_of(robot, true)),
+      output_(lower_, upper_, settings_.compensation.largest_correction_rad, settings_.motion) {
   if (settings_.direction_band_rad > Scalar(0)) band_inverse_ = Scalar(2) / settings_.direction_band_rad;
 }
 
@@ -70,24 +117,45 @@ void ControlCycle::track(const Joints& q) {
   }
 }
 
-// Joint limits of (C20): a fading or constant correction must not move a joint beyond a limit that the
-// command respects.
-Scalar ControlCycle::within_limits(std::size_t joint, Scalar q_command, Scalar q) const {
-  const Scalar low = q_command < lower_[joint] ? q_command : lower_[joint];
-  const Scalar high = q_command > upper_[joint] ? q_command : upper_[joint];
-  clamp_to(q, low, high);
-  return q;
+FLEXCOMP_RARE bool ControlCycle::is_within_limits(const Joints& q) const {
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (!(q[j] >= lower_[j] && q[j] <= upper_[j])) return false;
+  }
+  return true;
 }
 
-void ControlCycle::publish(StepStatus status) {
+// True where the context has changed since the last cycle by more than what may go through directly: as much
+// as the offset's acceleration allows. So the noise of a force sensor is followed without delay, and no load
+// makes a jump.
+bool ControlCycle::context_jumped(const FirmwareContext& context) {
+  Scalar force = Scalar(0);
+  Scalar com = Scalar(0);
+  FLEXCOMP_UNROLL
+  for (std::size_t k = 0; k < 3; ++k) {
+    force += std::fabs(context.force_n[k] - last_force_[k]);
+    com += std::fabs(context.payload_com_m[k] - last_com_[k]);
+    last_force_[k] = context.force_n[k];
+    last_com_[k] = context.payload_com_m[k];
+  }
+  const Scalar motion = force * sensitivity_.rad_per_n +
+                        com * std::fabs(context.payload_kg) * sensitivity_.rad_per_kg_m +
+                        std::fabs(context.payload_kg - last_payload_) * sensitivity_.rad_per_kg +
+                        std::fabs(context.temperature_c - last_temperature_) * sensitivity_.rad_per_k;
+  last_payload_ = context.payload_kg;
+  last_temperature_ = context.temperature_c;
+  return !(motion <= output_.motion_change_most());
+}
+
+void ControlCycle::publish(const StepResult& out) {
   count(publication_.cycles);
-  count(publication_.cycles_by_status[static_cast<std::size_t>(status)]);
-  publication_.last_status.store(static_cast<std::uint32_t>(status), std::memory_order_relaxed);
+  count(publication_.cycles_by_status[static_cast<std::size_t>(out.status)]);
+  publication_.last_status.store(static_cast<std::uint32_t>(out.status), std::memory_order_relaxed);
+  publication_.last_flags.store(out.flags, std::memory_order_relaxed);
   Scalar largest = largest_;
   for (std::size_t j = 0; j < joints; ++j) {
-    const Scalar c = correction_[j];
+    const Scalar c = output_.correction()[j];
     publication_.correction_rad[j].store(float_bits(static_cast<float>(c)), std::memory_order_relaxed);
-    const Scalar magnitude = c < Scalar(0) ? -c : c;
+    const Scalar magnitude = std::fabs(c);
     if (magnitude > largest) largest = magnitude;
   }
   largest_ = largest;
@@ -109,66 +177,41 @@ void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_r
 void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
   bool changed = false;
   const std::uint32_t index = sets_.handover.take(changed);
+  if (changed) {
+    is_new_set_ = true;  // an event of the next command that is used
+    if (index != Handover::none) sensitivity_ = sensitivity_of(sets_.models[index]);
+  }
   FiniteCheck<Scalar> command;
   command.add(q_command_rad);
-  if (!command.passed()) {
-    out.q = q_command_rad;
-    out.status = StepStatus::refused;
-    if (changed) source_ = Source::hold;  // the change of set is faded in by the next command that is finite
-    if (settings_.on_refusal == OnRefusal::hold_last_correction) {
-      for (std::size_t j = 0; j < joints; ++j) {
-        if (is_finite(out.q[j])) out.q[j] = within_limits(j, out.q[j], out.q[j] + correction_[j]);
-      }
-    }
-    publish(out.status);
-    return;
-  }
-  track(q_command_rad);
-  if (index == Handover::none) {
-    out.q = q_command_rad;
-    out.status = StepStatus::no_set;
-  } else {
+  const bool is_finite_command = command.passed();
+  if (is_finite_command) track(q_command_rad);
+  if (is_finite_command && index != Handover::none) {
     correct(sets_.models[index], q_command_rad, context, out);
-  }
-  Source source = Source::pass;
-  if (out.status < StepStatus::no_set) {
-    source = Source::set;
-  } else if (out.status == StepStatus::refused && settings_.on_refusal == OnRefusal::hold_last_correction) {
-    source = Source::hold;
+  } else {
+    out.q = q_command_rad;
+    out.remaining_position_m = out.remaining_orientation_rad = Scalar(0);
+    out.flags = index == Handover::none ? step_flag::no_set : std::uint16_t{0};
+    if (!is_finite_command || !is_within_limits(q_command_rad)) out.flags |= step_flag::refused;
   }
 
-  if (source == Source::hold) {
-    for (std::size_t j = 0; j < joints; ++j) {
-      out.q[j] = within_limits(j, q_command_rad[j], q_command_rad[j] + correction_[j]);
-    }
-    fade_left_ = 0;
-  } else {
-    if (changed || source != source_) {
-      for (std::size_t j = 0; j < joints; ++j)
-        fade_offset_[j] = correction_[j] - (out.q[j] - q_command_rad[j]);
-      fade_left_ = settings_.fade_cycles;
-    }
-    if (fade_left_ != 0) {
-      const Scalar v = static_cast<Scalar>(fade_left_) * fade_step_;
-      const Scalar weight = v * v * (Scalar(3) - Scalar(2) * v);
-      for (std::size_t j = 0; j < joints; ++j) {
-        // The offset adds to a correction that changes as the arm moves: the sum is limited again (C20).
-        const Scalar largest = settings_.compensation.largest_correction_rad;
-        const Scalar least = q_command_rad[j] - largest;
-        const Scalar most = q_command_rad[j] + largest;
-        Scalar q = out.q[j] + fade_offset_[j] * weight;
-        if (clamp_to(q, least, most) && source == Source::set && out.status != StepStatus::at_limit)
-          out.status = StepStatus::limited;
-        out.q[j] = within_limits(j, q_command_rad[j], q);
-        if (source == Source::set && (out.q[j] < q || out.q[j] > q)) out.status = StepStatus::at_limit;
-      }
-      --fade_left_;
-    }
-    FLEXCOMP_UNROLL
-    for (std::size_t j = 0; j < joints; ++j) correction_[j] = out.q[j] - q_command_rad[j];
+  bool jumped = false;
+  bool is_used = true;
+  if ((out.flags & step_flag::refused) != 0) {
+    is_used = settings_.on_refusal == OnRefusal::pass_through && is_within_limits(q_command_rad);
+  } else if (index != Handover::none) {
+    jumped = context_jumped(context);
   }
-  source_ = source;
-  publish(out.status);
+  if (is_used) {
+    const std::uint16_t cause = out.flags & event_flags;
+    const bool event = jumped || is_new_set_ || cause != last_cause_;
+    last_cause_ = cause;
+    is_new_set_ = false;
+    out.flags |= output_.follow(q_command_rad, event, out.q);
+  } else {
+    output_.hold(q_command_rad, out.q);
+  }
+  out.status = summary(out.flags);
+  publish(out);
 }
 
 }  // namespace firmware

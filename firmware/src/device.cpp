@@ -96,8 +96,8 @@ wire::Capability Device::capability() const {
   c.tables = static_cast<std::uint16_t>(FirmwareCapacity::tables);
   c.values = static_cast<std::uint32_t>(FirmwareCapacity::values);
   c.image_bytes = staging_bytes;
-  c.cycle_us = settings_.cycle_us;
-  c.fade_cycles = cycle_.settings().fade_cycles;
+  c.cycle_us = cycle_.settings().motion.cycle_us;
+  c.fade_cycles = cycle_.output().settling_cycles();
   c.firmware = firmware_version;
   c.nominal_hash = store_.nominal_hash();
   c.name_hash = robot_.name_hash;

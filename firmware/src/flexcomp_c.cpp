@@ -151,6 +151,25 @@ bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
   return norm > fw::Scalar(0.998F) && norm < fw::Scalar(1.002F);
 }
 
+bool is_above_zero(fw::Scalar v) { return flexcomp::is_finite(v) && v > fw::Scalar(0); }
+
+bool has_bounded_motion(const flexcomp_settings& s) {
+  for (const fw::Scalar rate : s.correction_rate_rad_s) {
+    if (!is_above_zero(rate)) return false;
+  }
+  return s.cycle_us != 0 && is_above_zero(s.offset_rate_rad_s) && is_above_zero(s.offset_acceleration_rad_s2);
+}
+
+namespace step_flag = flexcomp::step_flag;
+static_assert(FLEXCOMP_FLAG_REFUSED == step_flag::refused && FLEXCOMP_FLAG_NO_SET == step_flag::no_set &&
+                  FLEXCOMP_FLAG_AT_LIMIT == step_flag::at_limit &&
+                  FLEXCOMP_FLAG_LIMITED == step_flag::limited &&
+                  FLEXCOMP_FLAG_RATE_LIMITED == step_flag::rate_limited &&
+                  FLEXCOMP_FLAG_SETTLING == step_flag::settling &&
+                  FLEXCOMP_FLAG_NOT_CONVERGED == step_flag::not_converged &&
+                  FLEXCOMP_FLAG_NEAR_SINGULAR == step_flag::near_singular,
+              "one numbering of the flags");
+
 }  // namespace
 
 extern "C" {
@@ -173,11 +192,14 @@ void flexcomp_settings_default(flexcomp_settings* settings) {
   settings->direction_band_rad = d.control.direction_band_rad;
   settings->plausible_position_m = d.store.plausible_position_m;
   settings->plausible_orientation_rad = d.store.plausible_orientation_rad;
-  settings->fade_cycles = d.control.fade_cycles;
+  for (std::size_t j = 0; j < fw::joints; ++j)
+    settings->correction_rate_rad_s[j] = d.control.motion.correction_rate_rad_s[j];
+  settings->offset_rate_rad_s = d.control.motion.offset_rate_rad_s;
+  settings->offset_acceleration_rad_s2 = d.control.motion.offset_acceleration_rad_s2;
   settings->trial_cycles = d.store.trial_cycles;
   settings->staging_timeout_ms = d.store.staging_timeout_ms;
-  settings->cycle_us = d.cycle_us;
-  settings->on_refusal = FLEXCOMP_PASS_THROUGH;
+  settings->cycle_us = d.control.motion.cycle_us;
+  settings->on_refusal = FLEXCOMP_HOLD_LAST_OUTPUT;
 }
 
 flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
@@ -187,18 +209,22 @@ flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* rob
   flexcomp_settings s;
   flexcomp_settings_default(&s);
   if (settings != nullptr) s = *settings;
+  if (!has_bounded_motion(s)) return nullptr;
   const flexcomp_storage none = flexcomp_storage();
   fw::DeviceSettings d;
   d.control.compensation.largest_correction_rad = s.largest_correction_rad;
   d.control.direction_band_rad = s.direction_band_rad;
-  d.control.fade_cycles = s.fade_cycles;
-  d.control.on_refusal = s.on_refusal == FLEXCOMP_HOLD_LAST_CORRECTION ? fw::OnRefusal::hold_last_correction
-                                                                       : fw::OnRefusal::pass_through;
+  for (std::size_t j = 0; j < fw::joints; ++j)
+    d.control.motion.correction_rate_rad_s[j] = s.correction_rate_rad_s[j];
+  d.control.motion.offset_rate_rad_s = s.offset_rate_rad_s;
+  d.control.motion.offset_acceleration_rad_s2 = s.offset_acceleration_rad_s2;
+  d.control.motion.cycle_us = s.cycle_us;
+  d.control.on_refusal =
+      s.on_refusal == FLEXCOMP_PASS_THROUGH ? fw::OnRefusal::pass_through : fw::OnRefusal::hold;
   d.store.plausible_position_m = s.plausible_position_m;
   d.store.plausible_orientation_rad = s.plausible_orientation_rad;
   d.store.trial_cycles = s.trial_cycles;
   d.store.staging_timeout_ms = s.staging_timeout_ms;
-  d.cycle_us = s.cycle_us;
   d.name = robot->name;
   return reinterpret_cast<flexcomp_arm*>(new (memory) Arm(nominal, storage != nullptr ? *storage : none, d));
 }
@@ -215,6 +241,14 @@ void flexcomp_context_default(const flexcomp_arm* fc, flexcomp_context* context)
   context->payload_kg = c.payload_kg;
   for (std::size_t k = 0; k < 3; ++k) context->payload_com_m[k] = c.payload_com_m[k];
   context->temperature_c = c.temperature_c;
+}
+
+int flexcomp_start(flexcomp_arm* fc, const flexcomp_real q_standing_rad[FLEXCOMP_JOINTS]) {
+  return arm_of(fc).device.start(*reinterpret_cast<const fw::Joints*>(q_standing_rad)) ? 1 : 0;
+}
+
+uint32_t flexcomp_step_flags(const flexcomp_arm* fc) {
+  return arm_of(fc).device.cycle().publication().last_flags.load(std::memory_order_relaxed);
 }
 
 flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],

@@ -38,7 +38,6 @@ constexpr std::string_view usage =
     "  --modbus-tcp HOST[:PORT][:UNIT]            serve Modbus TCP; PORT 0 takes a free one\n"
     "  --modbus-rtu DEVICE[:BAUD[:PARITY]][:UNIT] serve Modbus RTU on a serial device\n"
     "  --cycle-us 1000                            period of the control cycle, us\n"
-    "  --fade-cycles 1000                         control cycles over which a set is faded in\n"
     "  --trial-cycles 60000                       control cycles until an unconfirmed trial reverts\n"
     "  --heartbeat-ms 1000                        CANopen heartbeat, ms; 0: none\n"
     "  --help                                     this text\n"
@@ -58,7 +57,6 @@ struct Options {
   std::optional<host::ModbusTcpAddress> tcp;
   std::optional<host::ModbusRtuAddress> rtu;
   std::uint32_t cycle_us = 1000;
-  std::uint32_t fade_cycles = 1000;
   std::uint32_t trial_cycles = 60000;
   std::uint16_t heartbeat_ms = 1000;
 };
@@ -116,7 +114,8 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
     } else if (option == "--cycle-us") {
       o.cycle_us = number(option, value, 50, 1000000);
     } else if (option == "--fade-cycles") {
-      o.fade_cycles = number(option, value, 0, 10000000);
+      // Older scripts give it; a change of set now settles at a rate, whatever the cycle.
+      number(option, value, 0, 10000000);
     } else if (option == "--trial-cycles") {
       o.trial_cycles = number(option, value, 1, 0xFFFFFFFF);
     } else if (option == "--heartbeat-ms") {
@@ -163,8 +162,7 @@ int serve(const Options& options) {
   hil::SlotFile slots(options.store);
 
   firmware::DeviceSettings settings;
-  settings.cycle_us = options.cycle_us;
-  settings.control.fade_cycles = options.fade_cycles;
+  settings.control.motion.cycle_us = options.cycle_us;
   settings.store.trial_cycles = options.trial_cycles;
   settings.name = robot.name.c_str();
   const auto device = std::make_unique<firmware::Device>(robot.nominal, slots.hooks(), settings);

@@ -3,6 +3,7 @@
 // byte.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -152,10 +153,18 @@ inline Scalar real(double v) { return static_cast<Scalar>(v); }
 /// An ordinary pose, rad.
 inline Joints some_joints() { return {real(0.1), real(0.2), real(0.3), real(0.4), real(0.5), real(0.6)}; }
 
-inline DeviceSettings fading_in(std::uint32_t cycles) {
+/// A cycle of a second: neither a rate nor an offset holds a correction back for more than a cycle.
+inline DeviceSettings following_at_once() {
   DeviceSettings settings;
-  settings.control.fade_cycles = cycles;
+  settings.control.motion.cycle_us = 1000000;
   return settings;
+}
+
+inline double distance(const Joints& a, const Joints& b) {
+  double greatest = 0;
+  for (std::size_t j = 0; j < joints; ++j)
+    greatest = std::max(greatest, std::abs(static_cast<double>(a[j] - b[j])));
+  return greatest;
 }
 
 /// An arm on a flash, with the control cycle at hand.

@@ -153,7 +153,20 @@ int main(void) {
   robot.max_rad[0] = 3;
 
   flexcomp_settings_default(&settings);
-  settings.fade_cycles = 10;
+  settings.cycle_us = 0;
+  EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
+  settings.cycle_us = 2000;
+  settings.correction_rate_rad_s[5] = 0;
+  EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
+  settings.correction_rate_rad_s[5] = (flexcomp_real)NAN;
+  EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
+  settings.correction_rate_rad_s[5] = 2;
+  settings.offset_rate_rad_s = -1;
+  EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
+  settings.offset_rate_rad_s = 1;
+  settings.offset_acceleration_rad_s2 = 0;
+  EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
+  settings.offset_acceleration_rad_s2 = 20;
   fc = flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage);
   EXPECT(fc != NULL);
   if (fc == NULL) return 1;

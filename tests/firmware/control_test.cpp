@@ -71,8 +71,8 @@ TEST(Probe, SaysWhatItCannotDo) {
   EXPECT_EQ(arm.device->probe(r).status, static_cast<std::uint16_t>(StepStatus::refused));
 }
 
-TEST(Step, EqualsTheCoreOnceFadedIn) {
-  Arm arm(fading_in(10));
+TEST(Step, EqualsTheCoreOnceSettled) {
+  Arm arm(following_at_once());
   const Bytes image = make_image(arm.robot, 1);
   ASSERT_EQ(arm.push(image), Answer::accepted);
   std::mt19937 random(2);
@@ -83,25 +83,25 @@ TEST(Step, EqualsTheCoreOnceFadedIn) {
     for (std::size_t j = 0; j < joints; ++j) c.direction[j] = arm.device->cycle().direction(j);
     const Compensated<Scalar, joints> expected = by_the_core(arm.robot, image, q, c);
     ASSERT_EQ(r.status, expected.status);
+    ASSERT_EQ(r.flags, expected.flags);
     ASSERT_EQ(r.q, expected.q);
   }
 }
 
 // However sets come and go (pushed, rolled back, on trial and reverted, restored, one in the middle of
-// another's fade), the correction moves by no more than the sets' own motion and the share of their
-// difference that the fade allows.
+// another's settling), a standing arm moves within the offset's rate and acceleration.
 TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
-  constexpr std::uint32_t fade = 50;
-  Arm arm(fading_in(fade));
+  Arm arm;
   std::mt19937 random(4);
   Joints q{};
   std::vector<Bytes> images;
   for (std::uint32_t n = 1; n <= 20; ++n) images.push_back(make_image(arm.robot, n, 1 + n % 5, n));
   std::uint32_t next = 0;
   Joints last{};
-  double largest_step = 0;
+  Joints last_move{};
   double largest_correction = 0;
-  bool first = true;
+  double fastest = 0;
+  double hardest = 0;
   for (int k = 0; k < 20000; ++k) {
     if (k % 37 == 0) {
       if (arm.device->status().state == 0 && next < 20) arm.stage(images[next]);
@@ -117,92 +117,313 @@ TEST(Step, AChangeOfSetNeverMakesTheCommandJump) {
     arm.device->store().poll(++arm.now_ms);
     // The command stands still, so all that moves is the change of set.
     const StepResult r = arm.step(q);
-    Joints correction;
+    Joints move;
     for (std::size_t j = 0; j < joints; ++j) {
-      correction[j] = r.q[j] - q[j];
-      largest_correction = std::max(largest_correction, std::abs(static_cast<double>(correction[j])));
-      if (!first) {
-        largest_step = std::max(largest_step, std::abs(static_cast<double>(correction[j] - last[j])));
-      }
+      const Scalar correction = r.q[j] - q[j];
+      move[j] = correction - last[j];
+      last[j] = correction;
     }
-    last = correction;
-    first = false;
+    largest_correction = std::max(largest_correction, distance(last, {}));
+    fastest = std::max(fastest, distance(move, {}));
+    hardest = std::max(hardest, distance(move, last_move));
+    last_move = move;
   }
   EXPECT_GT(largest_correction, 1e-4);
-  EXPECT_GT(largest_step, 0);
-  // The fading difference is at most twice the largest correction.
-  EXPECT_LE(largest_step, 1.5 / fade * 2 * largest_correction * (1 + 1e-6));
+  EXPECT_GT(fastest, 0);
+  EXPECT_LE(fastest, 0.5 * 1e-3 * (1 + 1e-9));
+  EXPECT_LE(hardest, 20 * 1e-6 * (1 + 1e-9));
 }
 
-TEST(Step, TheFirstSetIsFadedInFromZero) {
+/// An arm that has just been switched on, with a set in its memory.
+class PoweredUp : public testing::Test {
+ protected:
+  PoweredUp() {
+    Arm(flash).push(make_image(tx60l(), 1));
+    device = std::make_unique<Device>(tx60l(), flash.hooks(), DeviceSettings{});
+    device->store().boot();
+  }
+  StepResult step(const Joints& q) { return device->step(q, default_context<Scalar>(tx60l())); }
+
   Flash flash;
-  { Arm(flash).push(make_image(tx60l(), 1)); }
-  Device device(tx60l(), flash.hooks(), fading_in(100));
-  device.store().boot();
-  const FirmwareContext c = default_context<Scalar>(tx60l());
+  std::unique_ptr<Device> device;
+};
+
+TEST_F(PoweredUp, TheFirstOutputIsTheFirstCommand) {
   const Joints q = some_joints();
-  EXPECT_EQ(device.step(q, c).q, q);
-  for (int k = 0; k < 100; ++k) device.step(q, c);
-  EXPECT_NE(device.step(q, c).q, q);
+  StepResult r = step(q);
+  EXPECT_EQ(r.q, q);
+  // All the way to the corrected command the status says that it is not reached yet.
+  Joints last = q;
+  int cycles = 0;
+  for (; r.status != StepStatus::ok && cycles < 1000; ++cycles) {
+    EXPECT_EQ(r.status, StepStatus::limited);
+    EXPECT_EQ(r.flags, step_flag::settling);
+    r = step(q);
+    EXPECT_LE(distance(r.q, last), 0.5e-3 * (1 + 1e-9));
+    last = r.q;
+  }
+  EXPECT_GT(cycles, 5);
+  EXPECT_LT(cycles, 100);
+  EXPECT_EQ(r.flags, 0);
+  EXPECT_NE(r.q, q);
+  EXPECT_EQ(step(q).q, r.q) << "where it has settled it stands";
 }
 
-class OnRefusalTest : public testing::TestWithParam<OnRefusal> {};
-
-TEST_P(OnRefusalTest, CommandsThatCannotBeCorrected) {
-  DeviceSettings settings = fading_in(20);
-  settings.control.on_refusal = GetParam();
-  const bool hold = GetParam() == OnRefusal::hold_last_correction;
-  Arm arm(settings);
-  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+// The finding: after each power-up a standing arm moved by its whole correction.
+TEST_F(PoweredUp, AStandingArmStaysWhereItStands) {
   const Joints q = some_joints();
-  for (int k = 0; k < 5; ++k) arm.step(q);
-  const StepResult good = arm.step(q);
+  StepResult r = step(q);
+  for (int k = 0; k < 100; ++k) r = step(q);
+  const Joints standing = r.q;
+  ASSERT_NE(standing, q);
+
+  device = std::make_unique<Device>(tx60l(), flash.hooks(), DeviceSettings{});
+  device->store().boot();
+  ASSERT_TRUE(device->start(standing));
+  r = step(q);
+  EXPECT_EQ(r.q, standing);
+  for (int k = 0; k < 100; ++k) {
+    r = step(q);
+    EXPECT_LE(distance(r.q, standing), 1e-15);
+  }
+  EXPECT_EQ(r.status, StepStatus::ok);
+}
+
+TEST_F(PoweredUp, ACommandFarFromWhereTheArmStandsIsRefused) {
+  Joints standing = some_joints();
+  ASSERT_TRUE(device->start(standing));
+  Joints q = standing;
+  q[2] += real(0.101);
+  for (int k = 0; k < 10; ++k) {
+    const StepResult r = step(q);
+    EXPECT_EQ(r.q, standing);
+    EXPECT_EQ(r.status, StepStatus::refused);
+    EXPECT_NE(r.flags & step_flag::refused, 0);
+  }
+  q[2] -= real(0.002);
+  StepResult r = step(q);
+  EXPECT_EQ(r.q, standing);
+  EXPECT_EQ(r.status, StepStatus::limited);
+  for (int k = 0; k < 1000 && r.status != StepStatus::ok; ++k) r = step(q);
+  EXPECT_EQ(r.status, StepStatus::ok);
+
+  // What cannot be the place where an arm stands changes nothing.
+  standing[1] = std::numeric_limits<Scalar>::quiet_NaN();
+  EXPECT_FALSE(device->start(standing));
+  standing[1] = real(2.3);
+  EXPECT_FALSE(device->start(standing));
+  EXPECT_EQ(step(q).status, StepStatus::ok);
+}
+
+// Without a place where it stands the first commands that are refused go out as far as they are finite.
+TEST_F(PoweredUp, NothingThatIsNotFiniteGoesOutBeforeTheFirstCommand) {
+  Joints q = some_joints();
+  q[4] = std::numeric_limits<Scalar>::quiet_NaN();
+  StepResult r = step(q);
+  EXPECT_EQ(r.status, StepStatus::refused);
+  for (std::size_t j = 0; j < joints; ++j) EXPECT_EQ(r.q[j], j == 4 ? Scalar(0) : q[j]);
+  q[4] = real(2.5);  // beyond its limit, where an arm may well stand
+  r = step(q);
+  EXPECT_EQ(r.status, StepStatus::refused);
+  EXPECT_EQ(r.q, q);
+  q[4] = std::numeric_limits<Scalar>::infinity();
+  EXPECT_EQ(step(q).q[4], real(2.5));
+  q[4] = real(2.1);
+  r = step(q);
+  EXPECT_EQ(r.q, q);
+  EXPECT_EQ(r.status, StepStatus::limited);
+}
+
+class OnRefusalTest : public testing::TestWithParam<OnRefusal> {
+ protected:
+  OnRefusalTest() : arm(with(GetParam())) { arm.push(make_image(arm.robot, 1, 20)); }
+  static DeviceSettings with(OnRefusal how) {
+    DeviceSettings settings;
+    settings.control.on_refusal = how;
+    return settings;
+  }
+  StepResult settled(const Joints& q) {
+    StepResult r = arm.step(q);
+    for (int k = 0; k < 2000 && r.status != StepStatus::ok; ++k) r = arm.step(q);
+    return r;
+  }
+  bool holds() const { return GetParam() == OnRefusal::hold; }
+
+  Arm arm;
+};
+
+// The finding: one NaN made the other five joints jump by the whole correction, and went out to the drive.
+TEST_P(OnRefusalTest, ACommandWithANaNMovesNothing) {
+  const Joints q = some_joints();
+  const StepResult good = settled(q);
   ASSERT_EQ(good.status, StepStatus::ok);
+  ASSERT_GT(distance(good.q, q), 1e-3);
   for (const Scalar bad : {std::numeric_limits<Scalar>::quiet_NaN(), std::numeric_limits<Scalar>::infinity(),
                            -std::numeric_limits<Scalar>::infinity()}) {
     Joints broken = q;
     broken[3] = bad;
-    const StepResult r = arm.step(broken);
+    StepResult r = arm.step(broken);
     EXPECT_EQ(r.status, StepStatus::refused);
-    for (std::size_t j = 0; j < joints; ++j) {
-      if (j == 3) {
-        EXPECT_FALSE(is_finite(r.q[j]));
-      } else {
-        EXPECT_EQ(r.q[j], hold ? q[j] + (good.q[j] - q[j]) : q[j]);
-      }
-    }
-    const StepResult again = arm.step(q);
-    EXPECT_EQ(again.status, StepStatus::ok);
-    EXPECT_EQ(again.q, good.q) << "a command that is not finite leaves no trace";
+    EXPECT_EQ(r.flags, step_flag::refused);
+    EXPECT_EQ(r.q, good.q);
+    r = arm.step(q);
+    EXPECT_EQ(r.q, good.q) << "the first command after it is reached from where the arm stands";
+    r = settled(q);
+    EXPECT_EQ(r.status, StepStatus::ok);
+    EXPECT_EQ(r.q, good.q) << "a command that is not finite leaves no trace";
   }
-  // A context that is not finite: the last correction stays, or fades out.
+}
+
+// While the arm moves on, too: held for a cycle or for a hundred, it catches up within the offset's bounds.
+TEST_P(OnRefusalTest, AnArmCatchesUpWithoutAJump) {
+  Joints q = some_joints();
+  settled(q);
+  for (const int cycles : {1, 3, 100}) {
+    const auto move = [&q] {
+      q[0] += real(0.5e-3);
+      q[1] -= real(0.2e-3);
+    };
+    Joints last = arm.step(q).q;
+    for (int k = 0; k < cycles; ++k) {
+      move();
+      Joints broken = q;
+      broken[2] = std::numeric_limits<Scalar>::quiet_NaN();
+      EXPECT_EQ(arm.step(broken).q, last);
+    }
+    StepResult r{};
+    for (int k = 0; k < 1000 && r.status != StepStatus::ok; ++k) {
+      move();
+      r = arm.step(q);
+      if (k == 0) {
+        EXPECT_EQ(r.q, last);
+      }
+      // Its own motion, the offset's, and what the correction changes on the way.
+      EXPECT_LE(distance(r.q, last), 0.5e-3 + 0.5e-3 + 0.1e-3) << cycles << " " << k;
+      last = r.q;
+    }
+    EXPECT_EQ(r.status, StepStatus::ok);
+  }
+}
+
+TEST_P(OnRefusalTest, AContextThatIsNotFinite) {
+  const Joints q = some_joints();
+  const StepResult good = settled(q);
   FirmwareContext c = default_context<Scalar>(arm.robot);
   c.payload_kg = std::numeric_limits<Scalar>::quiet_NaN();
   Joints last = good.q;
-  for (int k = 0; k < 30; ++k) {
+  for (int k = 0; k < 200; ++k) {
     const StepResult r = arm.device->step(q, c);
     EXPECT_EQ(r.status, StepStatus::refused);
-    for (std::size_t j = 0; j < joints; ++j) {
-      EXPECT_LE(std::abs(r.q[j] - last[j]), real(1.51 / 20) * std::abs(good.q[j] - q[j]) + real(1e-7));
-    }
+    EXPECT_LE(distance(r.q, last), holds() ? 0 : 0.5e-3 * (1 + 1e-9));
     last = r.q;
   }
-  if (hold) {
-    for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(last[j], good.q[j], 1e-7);
-  } else {
-    EXPECT_EQ(last, q);
+  EXPECT_EQ(last, holds() ? good.q : q);
+  StepResult r{};
+  for (int k = 0; k < 200; ++k) {
+    r = arm.step(q);
+    EXPECT_LE(distance(r.q, last), 0.5e-3 * (1 + 1e-9));
+    last = r.q;
   }
-  // Beyond a limit.
-  Joints beyond = q;
-  beyond[0] = real(2.3);
-  EXPECT_EQ(arm.step(beyond).status, StepStatus::refused);
+  EXPECT_EQ(r.q, good.q);
+  EXPECT_EQ(r.status, StepStatus::ok);
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, OnRefusalTest,
-                         testing::Values(OnRefusal::pass_through, OnRefusal::hold_last_correction));
+TEST_P(OnRefusalTest, ACommandBeyondALimitIsHeldAlsoWithoutASet) {
+  for (const bool with_set : {true, false}) {
+    if (!with_set) {
+      ASSERT_EQ(arm.run(Command::restore_defaults), Answer::accepted);
+      arm.settle();
+    }
+    Joints q = some_joints();
+    StepResult good = settled(q);
+    for (int k = 0; k < 1000; ++k) good = arm.step(q);
+    q[0] = real(2.3);
+    const StepResult r = arm.step(q);
+    EXPECT_EQ(r.status, StepStatus::refused);
+    EXPECT_EQ(r.q, good.q);
+    EXPECT_EQ(r.flags, step_flag::refused | (with_set ? 0 : step_flag::no_set));
+  }
+}
 
-TEST(Step, FadesStayWithinTheLimits) {
-  Arm arm(fading_in(200));
+INSTANTIATE_TEST_SUITE_P(Both, OnRefusalTest, testing::Values(OnRefusal::pass_through, OnRefusal::hold));
+
+// The finding: a payload of 0, then 4 kg, moved the command by 4 mrad in one cycle, a force of 500 N by 0.9
+// mrad.
+TEST(Step, AJumpOfTheLoadIsFollowedWithinTheBounds) {
+  Arm arm;
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1, 10)), Answer::accepted);
+  const Joints q = some_joints();
+  FirmwareContext c = default_context<Scalar>(arm.robot);
+  Joints position{};
+  for (int k = 0; k < 500; ++k) position = arm.device->step(q, c).q;
+  const auto check = [&](const char* what, double least) {
+    const Joints before = position;
+    Joints last_move{};
+    StepResult r{};
+    for (int k = 0; k < 500; ++k) {
+      r = arm.device->step(q, c);
+      if (k == 0) {
+        EXPECT_EQ(r.status, StepStatus::limited) << what;
+        EXPECT_EQ(r.flags, step_flag::settling) << what;
+      }
+      Joints move;
+      for (std::size_t j = 0; j < joints; ++j) move[j] = r.q[j] - position[j];
+      EXPECT_LE(distance(move, {}), 0.5e-3 * (1 + 1e-9)) << what << " " << k;
+      EXPECT_LE(distance(move, last_move), 20e-6 * (1 + 1e-9)) << what << " " << k;
+      position = r.q;
+      last_move = move;
+    }
+    EXPECT_EQ(r.status, StepStatus::ok) << what;
+    EXPECT_GT(distance(r.q, before), least) << what;
+  };
+  c.payload_kg += 4;
+  check("payload", 1e-3);
+  c.force_n = {0, 0, 500};
+  check("force", 1e-3);
+  c.payload_com_m[2] += real(0.3);
+  check("centre of mass", 1e-4);
+}
+
+// What changes little from cycle to cycle, as the reading of a force sensor does, is followed without delay.
+TEST(Step, TheNoiseOfAForceIsFollowedWithoutDelay) {
+  Arm arm;
+  const Bytes image = make_image(arm.robot, 1);
+  ASSERT_EQ(arm.push(image), Answer::accepted);
+  const Joints q = some_joints();
+  FirmwareContext c = default_context<Scalar>(arm.robot);
+  for (int k = 0; k < 500; ++k) arm.device->step(q, c);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> noise(-0.2, 0.2);
+  for (int k = 0; k < 100; ++k) {
+    for (auto& f : c.force_n) f = real(noise(random));
+    const StepResult r = arm.device->step(q, c);
+    FirmwareContext tracked = c;
+    for (std::size_t j = 0; j < joints; ++j) tracked.direction[j] = arm.device->cycle().direction(j);
+    EXPECT_EQ(r.q, by_the_core(arm.robot, image, q, tracked).q);
+    EXPECT_EQ(r.status, StepStatus::ok);
+  }
+}
+
+// The finding: of near_singular, limited and at_limit only one was seen.
+TEST(Step, EveryFlagIsSeen) {
+  Arm arm(following_at_once());
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1, 20)), Answer::accepted);
+  Joints q = some_joints();
+  q[4] = 0;  // the wrist is straight
+  q[0] = real(2.2);
+  arm.step(q);
+  StepResult r = arm.step(q);
+  q[0] = real(-2.2);
+  arm.step(q);
+  const StepResult other = arm.step(q);
+  if ((r.flags & step_flag::at_limit) == 0) r = other;
+  EXPECT_EQ(r.status, StepStatus::at_limit);
+  EXPECT_EQ(r.flags, step_flag::at_limit | step_flag::near_singular);
+  EXPECT_EQ(arm.device->cycle().publication().last_flags.load(), other.flags);
+}
+
+TEST(Step, SettlingStaysWithinTheLimits) {
+  Arm arm;
   std::mt19937 random(6);
   for (std::uint32_t n = 1; n <= 10; ++n) {
     ASSERT_EQ(arm.stage(make_image(arm.robot, n, 4, n)), Answer::accepted);
@@ -220,11 +441,11 @@ TEST(Step, FadesStayWithinTheLimits) {
   }
 }
 
-// A constant correction must not move a joint over a limit that its command respects, and where the command comes
-// back the output moves no farther than the command does.
-TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
-  DeviceSettings settings = fading_in(200);
-  settings.control.on_refusal = OnRefusal::hold_last_correction;
+// Where the correction of a held output leads over a limit, the limit holds; and where the command comes back
+// the output moves no farther than the command does.
+TEST(Step, AHeldOutputStaysWithinTheLimits) {
+  DeviceSettings settings;
+  settings.control.on_refusal = OnRefusal::pass_through;
   Arm arm(settings);
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
   const Joints q = some_joints();
@@ -236,22 +457,19 @@ TEST(Step, AHeldCorrectionStaysWithinTheLimits) {
   unknown.temperature_c = std::numeric_limits<Scalar>::quiet_NaN();
   const StepResult limited = arm.device->step(end, unknown);
   EXPECT_EQ(limited.status, StepStatus::refused);
+  EXPECT_NE(limited.flags & step_flag::at_limit, 0);
   EXPECT_EQ(limited.q, end);
   Joints broken = end;
   broken[5] = std::numeric_limits<Scalar>::quiet_NaN();
-  const StepResult r = arm.step(broken);
-  for (std::size_t j = 0; j < 5; ++j) EXPECT_EQ(r.q[j], end[j]);
-  // Off the limit again the whole correction is still there; and from the limit the recovery is no jump.
-  const StepResult off = arm.device->step(q, unknown);
-  for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(off.q[j], good[j], 1e-6);
+  EXPECT_EQ(arm.step(broken).q, end);
   arm.device->step(end, unknown);
   const StepResult back = arm.step(end);
-  for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(back.q[j], end[j], 1e-6);
+  for (std::size_t j = 0; j < joints; ++j) EXPECT_NEAR(back.q[j], end[j], 20e-6 * (1 + 1e-9));
 }
 
-// Also while a set fades in and the arm moves on meanwhile.
+// Also while a set settles and the arm moves on meanwhile.
 TEST(Step, NoJointIsEverCorrectedByMoreThanTheLargestCorrection) {
-  DeviceSettings settings = fading_in(100);
+  DeviceSettings settings;
   settings.control.compensation.largest_correction_rad = real(1e-4);
   Arm arm(settings);
   std::mt19937 random(9);
@@ -303,14 +521,16 @@ TEST(Step, SurvivesAnyBits) {
     c.time_s = any();
     const StepResult r = arm.device->step(q, c);
     for (std::size_t j = 0; j < joints; ++j) {
-      if (!is_finite(q[j])) continue;
       ASSERT_TRUE(is_finite(r.q[j]));
-      ASSERT_LE(std::abs(r.q[j] - q[j]), real(0.2) + std::abs(q[j]) * real(1e-6));
+      ASSERT_LE(std::abs(r.q[j]), real(2.2));
+      if (r.status == StepStatus::ok) {
+        ASSERT_LE(std::abs(r.q[j] - q[j]), real(0.1));
+      }
     }
   }
   const Joints home{};
   StepResult r{};
-  for (int k = 0; k < 2000; ++k) r = arm.step(home);
+  for (int k = 0; k < 5000; ++k) r = arm.step(home);  // from any output that stands, at 0.5 rad/s
   EXPECT_EQ(
       r.status,
       by_the_core(arm.robot, make_image(arm.robot, 1), home, default_context<Scalar>(arm.robot)).status);

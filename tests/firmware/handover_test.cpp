@@ -19,7 +19,7 @@ using wire::Command;
 TEST(Handover, EveryCycleUsesOneWholeSet) {
   constexpr std::uint32_t sets = 8;
   DeviceSettings settings;
-  settings.control.fade_cycles = 0;
+  settings.control.motion.cycle_us = 1000000;
   const Robot robot = tx60l();
   const Joints q = {real(0.1), real(-0.2), real(0.3), real(0.4), real(0.5), real(-0.6)};
   const FirmwareContext context = default_context<Scalar>(robot);

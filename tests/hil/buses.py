@@ -174,7 +174,7 @@ class Bench:
             "modbus-tcp": f"modbus-tcp:127.0.0.1:{self.port}:{TCP_UNIT}",
             "modbus-rtu": f"modbus-rtu:{near}:{BAUD}:N:{RTU_UNIT}",
         }
-        self.arguments = ["--robot", f"{work}/robot.yaml", "--store", self.store, "--fade-cycles", "10"]
+        self.arguments = ["--robot", f"{work}/robot.yaml", "--store", self.store]
         if "can" in buses:
             self.arguments += ["--can", f"vcan0:{NODE}", "--heartbeat-ms", "200"]
         if "modbus-tcp" in buses:

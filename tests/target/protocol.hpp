@@ -151,7 +151,7 @@ class Exchange {
   bool start(const flexcomp_robot& robot) {
     flexcomp_settings settings;
     flexcomp_settings_default(&settings);
-    settings.fade_cycles = 8;
+    settings.cycle_us = 8000;  // a change of set settles within the few cycles that are made
     const flexcomp_storage storage = {this, read_slot, erase_slot, write_slot};
     fc_ = flexcomp_init(&memory_, sizeof memory_, &robot, &settings, &storage);
     if (fc_ == nullptr) return false;
@@ -177,7 +177,7 @@ class Exchange {
     transcript_.add('S', bytes, sizeof bytes);
   }
 
-  /// Background and cycle for a while; commands in 1/64 rad that move, so that directions are tracked and faded in.
+  /// Background and cycle for a while; commands in 1/64 rad that move, so that directions are tracked and a change of set settles.
   void cycles(unsigned count) {
     for (unsigned k = 0; k < count; ++k) {
       now_ms_ += 1;
@@ -186,9 +186,10 @@ class Exchange {
       for (unsigned i = 0; i < 6; ++i)
         q[i] = static_cast<flexcomp_real>(selftest::commands[1][i] + static_cast<int>(k % 5)) /
                flexcomp_real(64);
-      std::uint8_t out[49];
+      std::uint8_t out[50];
       out[0] = static_cast<std::uint8_t>(flexcomp_step(fc_, q, nullptr, q));
       for (unsigned i = 0; i < 6; ++i) flexcomp::store_u64(out + 1 + 8 * i, flexcomp::to_binary64_bits(q[i]));
+      out[49] = static_cast<std::uint8_t>(flexcomp_step_flags(fc_));
       transcript_.add('Q', out, sizeof out);
     }
   }

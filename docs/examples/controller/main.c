@@ -33,6 +33,9 @@ static flexcomp_status every_millisecond(flexcomp_real q_rad[FLEXCOMP_JOINTS]) {
   return flexcomp_step(arm, q_rad, NULL, q_rad); /* the command of your planner in, that for the drives out */
 }
 
+/* Yours: where the encoders say that the arm stands. */
+static const flexcomp_real standing_rad[FLEXCOMP_JOINTS] = {0.1f, -0.2f, 1.2f, 0.3f, 0.4f, 0.5f};
+
 int main(void) {
   uint32_t now_ms;
   uint16_t id;
@@ -44,6 +47,7 @@ int main(void) {
   can = flexcomp_can_init(&can_memory, sizeof can_memory, arm, 1, 1000, send_frame, NULL);
   if (can == NULL) return 2;
   flexcomp_boot(arm); /* the newest valid set of the two slots; none: commands pass through */
+  if (!flexcomp_start(arm, standing_rad)) return 4; /* before the drives are switched on: then nothing moves */
 
   /* Yours: for (;;), with your clock. Here a second of it, so that the image ends by itself in the emulator. */
   for (now_ms = 0; now_ms < 1000; ++now_ms) {

@@ -13,6 +13,7 @@
 #include "flexcomp/status.hpp"
 #include "flexcomp_firmware/config.hpp"
 #include "flexcomp_firmware/handover.hpp"
+#include "flexcomp_firmware/output_stage.hpp"
 
 namespace flexcomp {
 namespace firmware {
@@ -26,20 +27,34 @@ struct ParameterSets {
 /// Output for a command that is refused: not finite, beyond a joint limit, or with a context that is not
 /// finite.
 enum class OnRefusal : std::uint8_t {
-  pass_through = 0,          ///< the correction fades out to zero
-  hold_last_correction = 1,  ///< the last correction is added to the command
+  /// The command, if it is within the joint limits (so its context is not finite), while the correction
+  /// returns to 0 as after any event; any other command is held as by `hold`.
+  pass_through = 0,
+  hold = 1,  ///< the last output stands
 };
 
 /// Settings of the step.
 struct ControlSettings {
   CompensationSettings<Scalar> compensation{};  ///< of compensate()
-  /// Cycles of the fade (C19) from the old set's correction to the new one's; 0: at once.
-  std::uint32_t fade_cycles = 1000;
+  /// Bounds of the motion of the correction, and the period of the cycle (C19, C20).
+  MotionBounds<Scalar, joints> motion{};
   /// Band of (C18), rad: motion against the last direction after which a joint counts as reversed. Within it
   /// the direction moves linearly from -1 to +1, so that a reversal never makes the command step.
   Scalar direction_band_rad = Scalar(1e-4);
-  OnRefusal on_refusal = OnRefusal::pass_through;  ///< output for a refused command
+  OnRefusal on_refusal = OnRefusal::hold;  ///< output for a refused command
 };
+
+/// Largest motion of any joint's correction per change of the context.
+struct ContextSensitivity {
+  Scalar rad_per_kg = Scalar(0);    ///< of the payload's mass
+  Scalar rad_per_n = Scalar(0);     ///< of each component of the external force
+  Scalar rad_per_kg_m = Scalar(0);  ///< of each coordinate of the centre of mass, times the mass
+  Scalar rad_per_k = Scalar(0);     ///< of the temperature
+};
+
+/// Bounds the sensitivity of a set to its context: statics of the outstretched arm at the compliances, and
+/// thermal lengths at the reach. Effects of other load moments, cubes and tables are not in it.
+ContextSensitivity sensitivity_of(const FirmwareModel& model);
 
 /// Result of a step.
 using StepResult = Compensated<Scalar, joints>;
@@ -49,6 +64,7 @@ struct ControlPublication {
   std::atomic<std::uint32_t> cycles{0};                             ///< since the start, wraps
   std::array<std::atomic<std::uint32_t>, 6> cycles_by_status{};     ///< by StepStatus, wrap
   std::atomic<std::uint32_t> last_status{0};                        ///< StepStatus
+  std::atomic<std::uint32_t> last_flags{0};                         ///< bits of step_flag
   std::array<std::atomic<std::uint32_t>, joints> correction_rad{};  ///< binary32 bits
   std::atomic<std::uint32_t> largest_correction_rad{0};  ///< binary32 bits, of any joint since the start
 };
@@ -57,21 +73,26 @@ struct ControlPublication {
 /// handover and the publication.
 class ControlCycle {
  public:
-  /// Limits of the joints are the robot's. A negative or non-finite band or largest correction
-  /// is replaced by 0, which corrects nothing.
+  /// Limits of the joints are the robot's, no wider than sines and cosines reach. A negative or non-finite
+  /// band or largest correction is replaced by 0, which corrects nothing; for bounds of motion see
+  /// OutputStage.
   ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings);
+
+  /// Where the arm stands, rad: the output until a command lies within the largest correction of it, which is
+  /// then taken up without any motion. Before the first step, or from the context of step() to begin anew.
+  /// False where a number is not finite or beyond a limit.
+  bool start(const Joints& q_standing_rad) { return output_.start(q_standing_rad); }
 
   /// One control cycle. Directions are tracked from the commands (C18); `context.direction` is not used, but
   /// must be finite.
   ///
-  /// The active set is read once, at the start. When it changes, the difference between the correction of the
-  /// cycle before and the new set's decays to zero over fade_cycles, as v^2 (3 - 2 v) with v from 1 to 0
-  /// (C19). So a change of set moves the command by at most 1.5 / fade_cycles of that difference per cycle,
-  /// and no cycle evaluates two sets. The same holds where the status changes between corrected and passed
-  /// through.
+  /// The active set is read once, at the start; no cycle evaluates two sets. What it wants goes through the
+  /// OutputStage: at an event (another set, a jump of the context, a limit, a refusal, power-up) the output
+  /// does not jump, and the difference returns to exactly 0 (C19); otherwise it follows within the rate of
+  /// each joint (C20).
   ///
-  /// A command that is not finite is returned as it came (or with the last correction on its finite joints),
-  /// and leaves directions, correction and fade as they were. Bounded work on any input.
+  /// The output is finite whatever comes in. A command with a NaN leaves no trace in directions and
+  /// correction. Bounded work on any input.
   void step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out);
 
   /// State for the background.
@@ -80,30 +101,35 @@ class ControlCycle {
   const ControlSettings& settings() const { return settings_; }
   /// Direction of a joint as tracked, -1 … 1; 0 until it has moved.
   Scalar direction(std::size_t joint) const { return direction_[joint]; }
+  /// Where the command goes out, with its bounds.
+  const OutputStage<Scalar, joints>& output() const { return output_; }
 
  private:
-  enum class Source : std::uint8_t { pass, set, hold };
-
   void track(const Joints& q);
   void correct(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
                StepResult& out) const;
-  Scalar within_limits(std::size_t joint, Scalar q_command, Scalar q) const;
-  void publish(StepStatus status);
+  bool is_within_limits(const Joints& q) const;
+  bool context_jumped(const FirmwareContext& context);
+  void publish(const StepResult& out);
 
   ParameterSets& sets_;
   ControlSettings settings_;
   Joints lower_{};
   Joints upper_{};
-  Scalar fade_step_ = Scalar(0);
+  OutputStage<Scalar, joints> output_;
+  ContextSensitivity sensitivity_{};
   Scalar band_inverse_ = Scalar(0);
   Joints direction_{};
   Joints last_command_{};
-  Joints correction_{};   ///< of the last cycle, rad
-  Joints fade_offset_{};  ///< difference that decays, rad
-  std::uint32_t fade_left_ = 0;
-  Source source_ = Source::pass;
-  bool tracking_ = false;
+  // Of the last command that was used, but for time and motion.
+  std::array<Scalar, 3> last_com_{};
+  std::array<Scalar, 3> last_force_{};
+  Scalar last_payload_ = Scalar(0);
+  Scalar last_temperature_ = Scalar(0);
   Scalar largest_ = Scalar(0);
+  std::uint16_t last_cause_ = 0;
+  bool tracking_ = false;
+  bool is_new_set_ = false;
   ControlPublication publication_{};
 };
 

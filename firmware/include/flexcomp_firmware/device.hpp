@@ -19,9 +19,8 @@ namespace firmware {
 
 /// Settings of a device.
 struct DeviceSettings {
-  ControlSettings control{};      ///< of the step
-  StoreSettings store{};          ///< of the parameter store
-  std::uint32_t cycle_us = 1000;  ///< period of the control cycle, told to clients
+  ControlSettings control{};  ///< of the step; clients are told its period
+  StoreSettings store{};      ///< of the parameter store
   /// The robot's name (UTF-8), told to clients; copied. The set's binding is by its hash in the robot. May be
   /// null.
   const char* name = nullptr;
@@ -35,6 +34,9 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
+  /// ControlCycle::start().
+  bool start(const Joints& q_standing_rad) { return cycle_.start(q_standing_rad); }
+
   /// ControlCycle::step().
   void step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
     cycle_.step(q_command_rad, context, out);
@@ -46,9 +48,9 @@ class Device {
     return out;
   }
 
-  /// Compensation of one command by the active set, with an empty state (no fade; directions from the
-  /// request): compensate() of the core and nothing else, so that it equals the host's answer to the last
-  /// bit.
+  /// Compensation of one command by the active set, with an empty state (directions from the request; no
+  /// output stage): compensate() of the core and nothing else, so that it equals the host's answer to the
+  /// last bit.
   wire::ProbeResponse probe(const wire::ProbeRequest& request) const;
 
   /// The request's joint command with the robot's default context.

@@ -49,7 +49,7 @@
 ///   otherwise the length is known at the end. It goes to staging only; an aborted or timed-out transfer
 ///   leaves nothing behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
 /// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
-/// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by the fade-in,
+/// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by a bounded motion,
 ///   because between the two a controller would run a set that it can no longer read back.
 /// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
 ///   with 0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).

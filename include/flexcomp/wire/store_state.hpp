@@ -21,7 +21,7 @@
 ///      20 u32 table values                         20 u32 bytes of the active image
 ///      24 u32 longest image, bytes                 24 u32 CRC-32 of the active image (its last word)
 ///      28 u32 control cycle, us                    28 u32 sequence that rollback returns to, 0 for none
-///      32 u32 fade-in, control cycles              32 u32 bytes announced for the staged image
+///      32 u32 settling, control cycles             32 u32 bytes announced for the staged image
 ///      36 u32 firmware (major<<16|minor<<8|patch)  36 u32 bytes staged so far
 ///      40 nominal hash, 32 bytes                   40 u32 control cycles until a trial reverts, 0: no trial
 ///      72 hash of the robot's name, 32 bytes       44 u32 control cycles since the start (wraps)
@@ -124,7 +124,7 @@ struct Capability {
   std::uint32_t values = 0;                     ///< most table values
   std::uint32_t image_bytes = 0;                ///< longest image
   std::uint32_t cycle_us = 0;                   ///< period of the control cycle
-  std::uint32_t fade_cycles = 0;                ///< of the fade-in (C19)
+  std::uint32_t fade_cycles = 0;                ///< within which a change of set has settled (C19)
   std::uint32_t firmware = 0;                   ///< major << 16 | minor << 8 | patch
   std::array<std::uint8_t, 32> nominal_hash{};  ///< of the geometry
   std::array<std::uint8_t, 32> name_hash{};     ///< of the robot's name

@@ -21,8 +21,13 @@ UNIT = 1
 TICK_NS = 40
 CYCLE_TICKS = 25000
 PATH_CYCLES = 1000
+STATES = ("no_set", "settling", "active", "settling_out")
 ENOUGH_CYCLES = 900
-STATES = ("no_set", "fading", "active", "fading_out")
+SETTLING = 32  # the flag
+# What a change of set may add to a joint's command in a cycle of 1 ms: the image sets 3 mrad/s.
+OFFSET_NRAD = 3000
+# Of sensitivity_of() for such a set (firmware/src/control.cpp), in the cycle that takes it over.
+SENSITIVITY_INSTRUCTIONS = 700
 # As `identify` makes a set (geometry, compliance, gravity), and with eleven kinds of effect, also such as move more than
 # the joints: the step goes different ways for them.
 SETS = {
@@ -49,7 +54,6 @@ class Controller:
         # What is refused in every state; without a set no sequence is too old.
         self.refused = [image for what, (image, _) in spoiled_images(self.images[0]).items()
                         if what != "of an old sequence"]
-        self.fade_cycles = struct.unpack_from(">I", self.master.read(0x0000, 64), 32)[0]
         self.random = random.Random(2019)
 
     def stage(self, image):
@@ -123,7 +127,7 @@ def cycles(report, state, load):
 
 
 def phase(c, load, until):
-    """Every state, each over the whole path or nearly so, the fades as often as that takes: on a machine that is busy
+    """Every state, with and without a set over the whole path or nearly so, changes as often as that takes: on a machine that is busy
     elsewhere the bus is silent at times that were meant to be loaded."""
     def reached(state, paths):
         return lambda r: cycles(r, state, load) >= paths * PATH_CYCLES
@@ -141,13 +145,13 @@ def phase(c, load, until):
             paths += 1
             report = until(reached("active", paths), f"rolled back, {load}")
         c.run(RESTORE)
-        report = until(reached("no_set", 2 + paths), f"faded out, {load}")
+        report = until(reached("no_set", 2 + paths), f"settled, {load}")
         if all(cycles(report, state, load) >= ENOUGH_CYCLES for state in STATES):
             return report, (c.master.bytes - sent) / (report["cycles"] - before["cycles"])
     check(False, f"enough cycles of each state, {load}", report)
 
 
-def undisturbed(report, shift, fade_cycles):
+def undisturbed(report, shift):
     instructions = TICK_NS / 2 ** shift
     most = 0
     print("instructions of flexcomp_step    idle bus          bus under load    cycles idle, loaded")
@@ -157,30 +161,31 @@ def undisturbed(report, shift, fade_cycles):
         print("  %-12s             %8.0f … %-8.0f %8.0f … %-8.0f %6d, %d" % (
             state, a * instructions, b * instructions, x * instructions, y * instructions, idle["cycles"], loaded["cycles"]))
         if state == "changing":
-            # Taking a set over costs some instructions once, and the bus has always just been heard: no more than
-            # the largest of the rest with its margin.
-            check(loaded["cycles"] >= 6 and y <= 1.01 * most + 1, "nor where the set changes hands", y, most)
+            # Taking a set over costs some instructions once, with the bound of its sensitivity to the load some 300, and
+            # the bus has always just been heard: no more than the largest of the rest with that margin.
+            check(loaded["cycles"] >= 6 and y <= 1.01 * most + 1 + SENSITIVITY_INSTRUCTIONS / instructions,
+                  "nor where the set changes hands", y, most)
             continue
         most = max(most, b)
-        # One tick is what the counter cannot tell.
+        # One tick is what the counter cannot tell. Without a set the work is mostly that of the offset's return, whose
+        # branches (some 20 instructions of 1,150) differ from change to change.
+        margin = 0.03 if state == "settling_out" else 0.01
         for quiet, busy in ((a, x), (b, y)):
-            check(abs(busy - quiet) <= 0.01 * quiet + 1, f"{state}: within 1 % of an idle bus", quiet, busy)
-    passed("the instruction count of the step under load is within 1 % of that with an idle bus, in every state")
+            check(abs(busy - quiet) <= margin * quiet + 1, f"{state}: as with an idle bus", quiet, busy)
+    passed("the instruction count of the step under load is within 1 % of that with an idle bus; 3 % while a set settles out")
 
     check(report["late"] == 0, "no cycle is late", report["late"])
     check(all(abs(t - CYCLE_TICKS) <= CYCLE_TICKS // 100 for t in report["interval_ticks"]), "nor does one begin late",
           report["interval_ticks"])
     passed(f"none of {report['cycles']} cycles is late; they begin {report['interval_ticks']} ticks of 40 ns after each other")
 
-    # While the arm moves its correction changes by itself; a change of set may add what the fade allows.
-    for state in ("fading", "fading_out"):
+    # While the arm moves its correction changes by itself; a change of set may add what the offset's rate allows.
+    for state in ("settling", "settling_out"):
         for j in range(6):
             path = max(report[s]["change_moving_nrad"][j] for s in ("active", "no_set"))
-            apart = 2 * max(report[s]["largest_nrad"][j] for s in ("active", "fading", "fading_out"))
             change = report[state]["change_moving_nrad"][j]
-            check(change <= path + 1.5 * apart / fade_cycles + 2, f"{state}: joint {j + 1} does not jump on the move",
-                  change, path, apart)
-    passed("on the move no command jumps by more than the path and the fade-in make it")
+            check(change <= path + OFFSET_NRAD + 2, f"{state}: joint {j + 1} does not jump on the move", change, path)
+    passed("on the move no command jumps by more than the path and the offset's rate make it")
 
 
 def no_jump(c):
@@ -193,21 +198,19 @@ def no_jump(c):
         before = c.load_until(lambda r: r["cycles"] > 50, "standing still")
         check(not any(v for s in STATES for v in before[s]["change_standing_nrad"]), "nothing moves before", before)
         change()
-        # The fade has begun by now, at the latest.
-        over = c.console.ask()["cycles"] + c.fade_cycles + 20
-        after = c.load_until(lambda r: r["cycles"] > over, what)
-        worst = 0.0
+        # The offset moves by now, at the latest.
+        over = c.console.ask()["cycles"] + 20
+        after = c.load_until(lambda r: r["cycles"] > over and r["flags"] & SETTLING == 0, what)
+        worst, fastest = 0.0, 0
         for j in range(6):
             apart = abs(after["correction_nrad"][j] - before["correction_nrad"][j])
             largest = max(after[s]["change_standing_nrad"][j] for s in STATES + ("changing",))
-            allowed = 1.5 * apart / c.fade_cycles
             # Angles are told in whole nrad.
-            check(largest <= allowed + 2, f"{what}: joint {j + 1} does not jump", largest, allowed)
-            check(largest >= 0.99 * allowed - 2, f"{what}: and is faded over that many cycles", largest, allowed)
-            worst = max(worst, apart)
-        check(worst > 100 * c.fade_cycles, f"{what}: there is something to fade", worst)
-        passed(f"{what}: corrections move by up to {worst * 1e-6:.3f} mrad, in any cycle by at most "
-               f"{1.5 / c.fade_cycles:.4f} of it")
+            check(largest <= OFFSET_NRAD + 2, f"{what}: joint {j + 1} does not jump", largest)
+            worst, fastest = max(worst, apart), max(fastest, largest)
+        check(worst > 100000, f"{what}: there is something to settle", worst)
+        check(fastest >= 0.99 * OFFSET_NRAD - 2, f"{what}: and moves as fast as it may", fastest)
+        passed(f"{what}: corrections move by up to {worst * 1e-6:.3f} mrad, in any cycle by at most {fastest * 1e-6:.3f}")
     c.console.ask("m")
 
 
@@ -217,14 +220,14 @@ def main(work, shift, kind):
     c.console.ask("a")
     c.run(RESTORE)
     start = c.console.ask()["cycles"]
-    c.silent_until(lambda r: r["cycles"] > start + c.fade_cycles + 20, "the end of the fade")
+    c.silent_until(lambda r: r["cycles"] > start + 20 and r["flags"] & SETTLING == 0, "the change of set has settled")
     c.console.ask("0")
     phase(c, "idle", c.silent_until)
     report, rate = phase(c, "loaded", c.load_until)
     print(f"under load {rate:.1f} bytes a cycle on the bus, {c.master.answers} answers in all, "
           f"{c.master.repeated} requests repeated; "
           "a full line of 115200 baud carries 11.5")
-    undisturbed(report, shift, c.fade_cycles)
+    undisturbed(report, shift)
     no_jump(c)
     passed("all of it")
 

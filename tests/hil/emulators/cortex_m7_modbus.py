@@ -35,7 +35,7 @@ def judge_by_pymodbus(status, image):
         record = reads(0x0000, 64, function)
         check(record[:6] == b"\x01\x00\x00\x06\x00\x08", "protocol 1.0, six joints, double", record.hex())
         check(record[40:104].hex() == status["nominal_hash"] + status["name_hash"], "both hashes", record.hex())
-        check(struct.unpack(">II", record[28:36]) == (1000, 1000), "the cycle and the fade-in", record.hex())
+        check(struct.unpack(">II", record[28:36]) == (1000, 66675), "the cycle, and the cycles in which a change of set settles", record.hex())
     record = reads(0x0040, 48)
     check(record[:2] == b"\0\0" and struct.unpack(">III", record[16:28]) == (
         status["active"]["sequence"], len(image), int(status["active"]["crc"], 16)), "the status record", record.hex())

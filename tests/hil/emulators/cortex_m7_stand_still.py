@@ -19,7 +19,8 @@ def later(console, cycles):
 
 def main(files):
     console = Console()
-    later(console, 1100)  # a set that was pushed a moment ago is faded in
+    later(console, 20)
+    console.wait(lambda r: r["flags"] & 32 == 0, "the set that was pushed a moment ago has settled")
     rows = []
     while len(rows) < POSES:
         console.ask("m")

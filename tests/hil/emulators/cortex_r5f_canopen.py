@@ -160,7 +160,7 @@ def running_cycle(bench, bus):
     check(max(map(abs, expected)) > 0.01, "there is something to correct", expected)
     sdo = buses.HandMadeSdo(bus)
     end = time.monotonic() + PATIENCE
-    while True:  # the set is faded in
+    while True:  # the change of set settles
         told = [struct.unpack("<f", sdo.upload(0x2021, j))[0] for j in range(1, 7)]
         if all(abs(a - b) < 1e-6 for a, b in zip(told, expected)):
             break
