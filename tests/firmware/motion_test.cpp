@@ -86,7 +86,7 @@ Joints command_of(const std::array<double, joints>& q) {
 }
 
 TEST(Motion, EveryBoundHoldsInEveryCycle) {
-  const long cycles = motion_cycles(300000);
+  const long cycles = motion_cycles(1000000);
   const double ulp = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
   const Robot robot = tx60l();
   const double limit = static_cast<double>(real(2.2));
