@@ -83,15 +83,16 @@ inline void compensate(const Model<S, N, Cap>& model, const std::array<S, N>& q_
   detail::FlangeTarget<S> target;
   detail::rigid_pass(model.nominals(), angle, solver.joints(), target.flange);
   detail::flange_point(target.flange, vec3<S>(model.nominal_tool().position), target.tool_point);
-  solver.set(target.tool_point, settings);
+  const SingularRegion<S> region = singular_region(model.tool_motion(), settings);
+  solver.set(target.tool_point, region);
   std::array<S, N> q;
   FLEXCOMP_UNROLL
   for (std::size_t i = 0; i < N; ++i) q[i] = q_command[i];
   if (model.has_only_joint_deflections()) {
-    detail::correct_joint_deflections(model, target, context, angle, solver, settings, q);
+    detail::correct_joint_deflections(model, target, context, angle, solver, settings, region, q);
   } else {
     const Pose<S> target = nominal_forward(model, q_command);
-    detail::correct_general(model, target, context, settings, solver, q);
+    detail::correct_general(model, target, context, settings, region, solver, q);
   }
   // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
   S square = S(0);

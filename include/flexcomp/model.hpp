@@ -16,6 +16,7 @@
 #include "flexcomp/detail/link_shape.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
+#include "flexcomp/singular_region.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp/term.hpp"
 #include "flexcomp/trigonometry.hpp"
@@ -196,6 +197,7 @@ class Model {
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     sort_effects();
     compute_twists();
+    tool_motion_ = detail::provisional_tool_motion(*this);
   }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
@@ -292,6 +294,8 @@ class Model {
   S constant_theta(std::size_t i) const { return constant_[i][slot::theta]; }
   /// Motion by B, in Fb at its origin, to first order (C3).
   const SmallMotion<S>& base_twist() const { return base_twist_; }
+  /// How far the set moves the tool at most, for the thresholds of (C9).
+  const ToolMotion<S>& tool_motion() const { return tool_motion_; }
 
  private:
   bool reads_direction(const Term<S>& t) const {
@@ -399,6 +403,7 @@ class Model {
   S inverse_gravity_ = S(0);
   std::array<SmallMotion<S>, N> link_twist_{};
   SmallMotion<S> base_twist_{};
+  ToolMotion<S> tool_motion_{};
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
   std::array<Count, detail::group::count> group_end_{};
   std::array<Count, Cap::terms> order_{};

@@ -29,6 +29,7 @@ int usage() {
       "  --seconds S       of search for each arm (20)\n"
       "  --evaluations N   of search for each arm, in place of seconds\n"
       "  --seed N          of random numbers (1)\n"
+      "  --steepest K      setting of the compensation (100)\n"
       "  --scale X         times Table 1 (1)\n"
       "  --step H          of the differences, rad (5e-6)\n"
       "  --poses N         for the share with error left (20000)\n",
@@ -49,6 +50,8 @@ bool read(int argc, char** argv, Options& o) {
       o.evaluations = std::strtol(value, nullptr, 10);
     } else if (name == "--seed") {
       o.seed = std::strtoull(value, nullptr, 10);
+    } else if (name == "--steepest") {
+      o.settings.steepest = std::strtod(value, nullptr);
     } else if (name == "--scale") {
       o.scale = std::strtod(value, nullptr);
     } else if (name == "--step") {
@@ -79,10 +82,11 @@ void search(const arms::Arm& arm, const Options& o) {
   for (const double v : best.q) std::printf(" %.9f", v);
   const slopes::Share left = slopes::share(s, o.poses, o.seed + 1);
   std::printf(
-      "; left: %.2f %% above 0.02 mm, %.2f %% above 1 mrad, most %.2f mm, %.0f mrad; worse than before "
+      "; not ok %.2f %%; left: %.2f %% above 0.02 mm, %.2f %% above 1 mrad, most %.2f mm, %.0f mrad; worse "
+      "than before "
       "%.3f %%, by %.2f mm (%ld evaluations)\n",
-      100 * left.position, 100 * left.orientation, 1e3 * left.most_m, 1e3 * left.most_rad, 100 * left.worse,
-      1e3 * left.worse_m, taken);
+      100 * left.held, 100 * left.position, 100 * left.orientation, 1e3 * left.most_m, 1e3 * left.most_rad,
+      100 * left.worse, 1e3 * left.worse_m, taken);
   std::fflush(stdout);
 }
 

@@ -184,6 +184,7 @@ inline void climb(const Subject& s, arms::Random& random, double step, Found& be
 /// What stays at random poses. Those at which a joint is held at its limit are left out.
 struct Share {
   int poses = 0;
+  double held = 0;         ///< share that is not answered `ok`
   double position = 0;     ///< share with more than 0.02 mm left
   double orientation = 0;  ///< share with more than 1 mrad left
   double most_m = 0;       ///< largest position error left
@@ -200,6 +201,7 @@ inline Share share(const Subject& s, int poses, std::uint64_t seed) {
     const auto done = flexcomp::compensate(s.model, q, s.context, s.settings);
     if (done.status == flexcomp::StepStatus::at_limit) continue;
     ++out.poses;
+    if (done.status != flexcomp::StepStatus::ok) ++out.held;
     const auto after = flexcomp::target_residual(s.model, done.q, q, s.context);
     const double before_m = flexcomp::target_residual(s.model, q, q, s.context).position_m;
     if (after.position_m > 20e-6) ++out.position;
@@ -209,7 +211,7 @@ inline Share share(const Subject& s, int poses, std::uint64_t seed) {
     out.most_rad = std::max(out.most_rad, after.orientation_rad);
     out.worse_m = std::max(out.worse_m, after.position_m - before_m);
   }
-  for (double* v : {&out.position, &out.orientation, &out.worse}) *v /= out.poses;
+  for (double* v : {&out.held, &out.position, &out.orientation, &out.worse}) *v /= out.poses;
   return out;
 }
 

@@ -19,7 +19,8 @@ namespace detail {
 template <class S, std::size_t N, class Cap>
 inline void correct_general(const Model<S, N, Cap>& model, const Pose<S>& target,
                             const Context<S, N>& context, const CompensationSettings<S>& settings,
-                            DampedJacobianSolver<S, N>& solver, std::array<S, N>& q) {
+                            const SingularRegion<S>& region, DampedJacobianSolver<S, N>& solver,
+                            std::array<S, N>& q) {
   Workspace<S, N> ws;
   ws.q = q;
   for (std::size_t i = 0; i < N; ++i) ws.reading[i] = sin_cos(q[i]);
@@ -41,7 +42,7 @@ inline void correct_general(const Model<S, N, Cap>& model, const Pose<S>& target
       for (std::size_t i = 0; i < N; ++i)
         solver.joints()[i] = {vec3<S>(ws.frames.axis(i, 2)), vec3<S>(ws.frames.origin[i])};
       const Vec3<S> tool = vec3<S>(model.tool_pose().position);
-      solver.set(vec3<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool), settings);
+      solver.set(vec3<S>(ws.frames.origin[N]) + combine(columns_of(ws.frames.rotation[N]), tool), region);
     }
     std::array<S, N> dq;
     solver.solve(position, orientation, largest, largest * allowed_turn<S>(k), dq);

@@ -92,7 +92,8 @@ template <class S, std::size_t N, class Cap>
 inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarget<S>& target,
                                       const Context<S, N>& context, std::array<SinCos<S>, N>& angle,
                                       DampedJacobianSolver<S, N>& solver,
-                                      const CompensationSettings<S>& settings, std::array<S, N>& q) {
+                                      const CompensationSettings<S>& settings,
+                                      const SingularRegion<S>& region, std::array<S, N>& q) {
   const S largest = settings.largest_correction_rad;
   std::array<S, N> dq;
   SmallMotion<S> move;
@@ -152,7 +153,7 @@ inline void correct_joint_deflections(const Model<S, N, Cap>& model, FlangeTarge
     // some percent: from there on the Jacobian of this chain is used, which is close to that of the solution.
     if (k == 1 && (solver.is_damped() || solver.jacobian_is_stale(turned))) {
       solver.joints() = joints;
-      solver.set(point, settings);
+      solver.set(point, region);
       fresh = true;
     }
     S square = solver.solve(shift, turn, largest, largest_turn, dq);
