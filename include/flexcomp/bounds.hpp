@@ -17,10 +17,8 @@ namespace flexcomp {
 template <class S>
 struct CompensationSettings {
   S largest_correction_rad = S(0.1);  ///< of any joint; a larger correction is scaled as a whole (C10, C17)
-  /// Threshold of kappa^(1/2) below which damping sets in (C9): m/rad for position, 1 for orientation. An arm
-  /// whose Jacobian has a smallest singular value of 0.1 (lengths in m) is never below 0.1/sqrt(3).
-  S singular_below = S(0.05);
-  S damping = S(0.1);  ///< at the singularity itself (C9)
+  /// Greatest slope of the correction over the command near singularities (C9), 2-norms: a larger one leaves less error there.
+  S steepest = S(100);
 };
 
 /// Sum of 0·x over numbers: 0 where all are finite, else NaN. Two operations per number, no branch.

@@ -15,6 +15,7 @@
 #include "flexcomp/detail/link_shape.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/robot.hpp"
+#include "flexcomp/singular_region.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp/term.hpp"
 #include "flexcomp/trigonometry.hpp"
@@ -194,6 +195,7 @@ class Model {
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     plan_.set(*this);
+    tool_motion_ = detail::provisional_tool_motion(*this);
   }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
@@ -250,6 +252,8 @@ class Model {
   const Term<S>& effect_of(std::uint8_t group, std::size_t k) const {
     return effects_[plan_.index(group, k)];
   }
+  /// How far the set moves the tool at most, for the thresholds of (C9).
+  const ToolMotion<S>& tool_motion() const { return tool_motion_; }
 
  private:
   bool reads_direction(const Term<S>& t) const {
@@ -286,6 +290,7 @@ class Model {
   bool reads_direction_ = false;
   bool axial_gravity_ = true;
   std::array<std::uint8_t, N> link_moves_{};
+  ToolMotion<S> tool_motion_{};
   detail::CyclePlan<S, N, Cap> plan_{};
   std::size_t effect_count_ = 0;
   std::size_t table_count_ = 0;

@@ -90,6 +90,47 @@ inline Robot ur10() {
   return r;
 }
 
+/// Universal Robots UR5: as the UR10, with a plain flange. Lengths: host/robots/ur5.yaml.
+inline Robot ur5() {
+  Robot r;
+  r.links = {link(0, 89.159, 0, 90), link(0, 0, -425, 0),    link(0, 0, -392.25, 0),
+             link(0, 109.15, 0, 90), link(0, 94.65, 0, -90), link(0, 82.3, 0, 0)};
+  for (flexcomp::JointLimits& l : r.limits) l = limits(-360, 360);
+  r.gravity_m_s2 = {0, 0, -9.81};
+  r.tool_xyz_m = {10 * mm, 30 * mm, 60 * mm};
+  r.payload_kg = 1.108;
+  r.payload_com_m = {5 * mm, 8 * mm, 60 * mm};
+  return r;
+}
+
+/// ABB IRB 120: spherical wrist, offset elbow. host/robots/abb-irb120.yaml.
+inline Robot irb120() {
+  Robot r;
+  r.links = {link(0, 290, 0, -90), link(-90, 0, 270, 0), link(0, 0, 70, -90),
+             link(0, 302, 0, 90),  link(0, 0, 0, -90),   link(180, 72, 0, 0)};
+  r.limits = {limits(-165, 165), limits(-110, 110), limits(-110, 70),
+              limits(-160, 160), limits(-120, 120), limits(-400, 400)};
+  r.gravity_m_s2 = {0, 0, -9.81};
+  r.tool_xyz_m = {10 * mm, 30 * mm, 60 * mm};
+  r.payload_kg = 1.108;
+  r.payload_com_m = {5 * mm, 8 * mm, 60 * mm};
+  return r;
+}
+
+/// KUKA KR 6 R900: offset shoulder and elbow; its first axis points down. host/robots/kuka-kr6-r900.yaml.
+inline Robot kr6() {
+  Robot r;
+  r.links = {link(0, -400, 25, 90), link(0, 0, 455, 0), link(-90, 0, 35, 90),
+             link(0, -420, 0, -90), link(0, 0, 0, 90),  link(180, -80, 0, 180)};
+  r.limits = {limits(-170, 170), limits(-190, 45),  limits(-120, 156),
+              limits(-185, 185), limits(-120, 120), limits(-350, 350)};
+  r.gravity_m_s2 = {0, 0, 9.81};
+  r.tool_xyz_m = {10 * mm, 30 * mm, 60 * mm};
+  r.payload_kg = 3;
+  r.payload_com_m = {5 * mm, 8 * mm, 60 * mm};
+  return r;
+}
+
 struct Arm {
   const char* name;
   Robot robot;
@@ -99,6 +140,17 @@ struct Arm {
 inline const std::array<Arm, 3>& all() {
   static const std::array<Arm, 3> list{
       {{"TX60L", tx60l(), false}, {"RX160L", rx160l(), false}, {"UR10", ur10(), true}}};
+  return list;
+}
+
+/// all(), and three whose geometry is that of host/robots.
+inline const std::array<Arm, 6>& six() {
+  static const std::array<Arm, 6> list{{all()[0],
+                                        all()[1],
+                                        all()[2],
+                                        {"UR5", ur5(), true},
+                                        {"IRB120", irb120(), false},
+                                        {"KR6", kr6(), false}}};
   return list;
 }
 

@@ -182,7 +182,8 @@ class Correction {
 
   void undo_constant_terms(std::array<S, N>& q) {
     take_nominal(q);
-    solver_.set(nominal_point_, settings_);
+    region_ = singular_region(model_.tool_motion(), settings_);
+    solver_.set(nominal_point_, region_);
     if (rate_ != nullptr) solver_.motion_by(rate_->command, rate_->target);
     SmallMotion<S> move;
     constant_twist(model_, angle_, move);
@@ -287,7 +288,7 @@ class Correction {
       // from there on the Jacobian of this chain is used, which is close to that of the solution.
       if (!fresh_ && (solver_.is_damped() || solver_.jacobian_is_stale(turned_))) {
         solver_.joints() = joints_;
-        solver_.set(point, settings_);
+        solver_.set(point, region_);
         fresh_ = true;
         turned_ = S(0);
       }
@@ -473,6 +474,7 @@ class Correction {
   const CompensationSettings<S>& settings_;
   CommandRate<S, N>* rate_;  ///< null where rate() is not asked for
 
+  SingularRegion<S> region_;  ///< where the Jacobian is damped
   DampedJacobianSolver<S, N> solver_;
   std::array<SinCos<S>, N> angle_;        ///< of the chain's joints
   std::array<S, N> ahead_;                ///< what q is ahead of `angle_`, rad

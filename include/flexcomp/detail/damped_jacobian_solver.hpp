@@ -4,8 +4,8 @@
 ///
 /// J J^T is factored in 3x3 blocks, position first:
 ///
-///     [P  Q^T] [u]   [e_p]        P = Jp Jp^T + lp^2 1,   Q = Jo Jp^T,
-///     [Q  O  ] [v] = [e_o],       M = Jo Jo^T - Q P^-1 Q^T + lo^2 1,   dq = Jp^T u + Jo^T v
+///     [P  Q^T] [u]   [e_p]        P = Jp Jp^T + lp 1,     Q = Jo Jp^T,
+///     [Q  O  ] [v] = [e_o],       M = Jo Jo^T - Q P^-1 Q^T + lo W,     dq = Jp^T u + Jo^T v
 ///
 /// Both dampings (C9) are zero where the arm is regular. Near a singularity lo grows first and smoothly: the
 /// first block row still holds exactly, so the error stays in the orientation. lp grows only where the
@@ -22,6 +22,7 @@
 #include "flexcomp/bounds.hpp"
 #include "flexcomp/detail/rigid_chain.hpp"
 #include "flexcomp/linear.hpp"
+#include "flexcomp/singular_region.hpp"
 
 namespace flexcomp {
 
@@ -36,36 +37,88 @@ struct Symmetric {
     return {yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy,
             xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz};
   }
+  Vec3<S> operator*(const Vec3<S>& v) const {
+    return {xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z};
+  }
   Symmetric over(const S& divisor) const {
     const S k = S(1) / divisor;
     return {xx * k, yy * k, zz * k, xy * k, xz * k, yz * k};
   }
 };
 
-/// Inverse of a symmetric positive block with damping (C9). `regular` becomes the smaller one of itself and
-/// kappa = 1 / trace(A^-1), which is at most the square of the smallest singular value.
+/// Adds v v^T.
 template <class S>
-inline void damped_inverse(const Symmetric<S>& a, const CompensationSettings<S>& settings,
-                           Symmetric<S>& inverse, S& regular) {
-  // 1 / trace(A^-1) = det(A) / trace(adj(A)) needs no division by a vanishing determinant.
-  const Symmetric<S> b = a.adjugate();
-  const S trace = b.xx + b.yy + b.zz;
-  const S determinant = a.xx * b.xx + a.xy * b.xy + a.xz * b.xz;
-  const S threshold = settings.singular_below * settings.singular_below;
-  const S measure = trace > S(0) && determinant > S(0) ? determinant / trace : S(0);
-  if (measure < regular) regular = measure;
-  if (measure >= threshold) {
-    inverse = b.over(determinant);
-    return;
+inline void add_outer(const Vec3<S>& v, Symmetric<S>& a) {
+  a.xx += v.x * v.x, a.yy += v.y * v.y, a.zz += v.z * v.z;
+  a.xy += v.x * v.y, a.xz += v.x * v.z, a.yz += v.y * v.z;
+}
+
+/// Determinant of a symmetric matrix with this adjugate.
+template <class S>
+inline S determinant(const Symmetric<S>& a, const Symmetric<S>& adjugate) {
+  return a.xx * adjugate.xx + a.xy * adjugate.xy + a.xz * adjugate.xz;
+}
+
+/// Trace of the product of two symmetric matrices.
+template <class S>
+inline S trace_of_product(const Symmetric<S>& a, const Symmetric<S>& b) {
+  return a.xx * b.xx + a.yy * b.yy + a.zz * b.zz + S(2) * (a.xy * b.xy + a.xz * b.xz + a.yz * b.yz);
+}
+
+/// Inverse of a symmetric positive matrix by its L D L^T factors, and its determinant: errors grow with the condition
+/// number, those of the adjugate with its square.
+template <class S>
+inline S invert_factored(const Symmetric<S>& a, Symmetric<S>& inverse) {
+  const S x = S(1) / a.xx;
+  const S l = a.xy * x, m = a.xz * x;
+  const S d = a.yy - l * a.xy;
+  const S e = a.yz - l * a.xz;
+  const S y = S(1) / d;
+  const S n = e * y;
+  const S f = a.zz - m * a.xz - n * e;
+  const S z = S(1) / f;
+  const S k = l * n - m;  // of L^-1, last row: k, -n, 1
+  inverse.zz = z;
+  inverse.yz = -n * z;
+  inverse.xz = k * z;
+  inverse.yy = y + n * n * z;
+  inverse.xy = -l * y - n * k * z;
+  inverse.xx = x + l * l * y + k * k * z;
+  return a.xx * d * f;
+}
+
+/// A + k W.
+template <class S>
+inline Symmetric<S> sum(const Symmetric<S>& a, const S& k, const Symmetric<S>& w) {
+  return {a.xx + k * w.xx, a.yy + k * w.yy, a.zz + k * w.zz,
+          a.xy + k * w.xy, a.xz + k * w.xz, a.yz + k * w.yz};
+}
+
+/// Inverse of a symmetric positive block A, damped along W (C9) where the least eigenvalue of A against W is below
+/// `threshold`: true there.
+template <class S>
+inline bool damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, S threshold, Symmetric<S>& inverse) {
+  // The eigenvalues z of (A + t W)^-1 t W are t / (mu + t), with z^3 - e1 z^2 + e2 z - e3 = 0. All are real and at most 1:
+  // from there Newton's method falls to the greatest one. The number of steps is fixed: a smooth function of A and W.
+  const S t = threshold;
+  const Symmetric<S> d = sum(a, t, w);
+  const S scale = t / invert_factored(d, inverse);
+  const Symmetric<S> v = w.adjugate();
+  const S e1 = t * trace_of_product(inverse, w);
+  const S e2 = t * scale * trace_of_product(d, v);
+  const S e3 = t * t * scale * determinant(w, v);
+  S z = S(1);
+  for (int n = 0; n < 6; ++n) {
+    const S value = ((z - e1) * z + e2) * z - e3;
+    const S rise = (S(3) * z - S(2) * e1) * z + e2;
+    if (!(value > S(0) && rise > S(0))) break;
+    z -= value / rise;
   }
-  const S lack = S(1) - measure / threshold;
-  const S lambda = settings.damping * settings.damping * lack * lack;
-  Symmetric<S> d = a;
-  d.xx += lambda;
-  d.yy += lambda;
-  d.zz += lambda;
-  const Symmetric<S> e = d.adjugate();
-  inverse = e.over(d.xx * e.xx + d.xy * e.xy + d.xz * e.xz);
+  // mu / t = 1 / z - 1
+  const S lack = S(2) - S(1) / z;
+  const bool damped = lack > S(0);
+  invert_factored(damped ? sum(a, t * lack * lack, w) : a, inverse);
+  return damped;
 }
 
 /// Limit of the orientation part in a correction (0, 1, 2), relative to the largest correction (C10). A
@@ -87,8 +140,7 @@ class DampedJacobianSolver {
   std::array<JointAxis<S>, N>& joints() { return column_; }
 
   /// Factors the Jacobian at the tool point, in F0, m. Work: one pass over the joints, two 3x3 inverses.
-  void set(const Vec3<S>& tool, const CompensationSettings<S>& settings) {
-    regular_ = S(1);
+  void set(const Vec3<S>& tool, const SingularRegion<S>& region) {
     Symmetric<S> block;
     {
       const S tx = tool.x, ty = tool.y, tz = tool.z;
@@ -110,7 +162,7 @@ class DampedJacobianSolver {
       }
       block = {xx, yy, zz, xy, xz, yz};
     }
-    damped_inverse(block, settings, position_, regular_);
+    const S of_position = invert(block, position_);
     // Rows of Q = Jo Jp^T.
     S q[9];
     {
@@ -166,8 +218,15 @@ class DampedJacobianSolver {
     zz -= gain_[7] * q[7];
     zz -= gain_[8] * q[8];
     block = {xx, yy, zz, xy, xz, yz};
-    damped_inverse(block, settings, orientation_, regular_);
-    if (!(regular_ >= settings.singular_below * settings.singular_below)) damped_ = true;
+    const S of_orientation = invert(block, orientation_);
+    regular_ = of_position < of_orientation ? of_position : of_orientation;
+    if (!(regular_ < S(1))) regular_ = S(1);
+    // W is at most 1 + l^2 tr(G G^T), and the trace at most that of Q P^-1 Q^T over the least eigenvalue of P: N / kappa of P.
+    if (!(of_position >= region.position &&
+          of_orientation * of_position >=
+              region.orientation * (of_position + S(static_cast<int>(N)) * region.length_squared))) {
+      set_damped(region);
+    }
   }
 
   /// Motion of tool point (m) and flange (rad) by joint turns, to first order: J dq.
@@ -231,6 +290,42 @@ class DampedJacobianSolver {
   }
 
  private:
+  /// Inverse of a block A, of no use where A is singular. Returns kappa = 1 / trace(A^-1) of (C9).
+  static S invert(const Symmetric<S>& a, Symmetric<S>& inverse) {
+    // 1 / trace(A^-1) = det(A) / trace(adj(A)) needs no division by a vanishing determinant.
+    const Symmetric<S> b = a.adjugate();
+    const S trace = b.xx + b.yy + b.zz;
+    const S det = determinant(a, b);
+    inverse = b.over(det);
+    return trace > S(0) && det > S(0) ? det / trace : S(0);
+  }
+
+  /// The factorisation again from column_, with damping (C9) where an eigenvalue is below its threshold.
+  FLEXCOMP_ONCE void set_damped(const SingularRegion<S>& region) {
+    Symmetric<S> p{}, m{};
+    Vec3<S> q[3] = {};
+    for (const JointAxis<S>& c : column_) {
+      add_outer(c.origin, p);
+      add_outer(c.axis, m);
+      q[0] = q[0] + c.origin * c.axis.x;
+      q[1] = q[1] + c.origin * c.axis.y;
+      q[2] = q[2] + c.origin * c.axis.z;
+    }
+    Symmetric<S> w = {S(1), S(1), S(1), S(0), S(0), S(0)};
+    if (damped_inverse(p, w, region.position, position_)) damped_ = true;
+    Vec3<S> g[3];
+    for (int r = 0; r < 3; ++r) {
+      g[r] = position_ * q[r];
+      gain_[3 * r] = g[r].x, gain_[3 * r + 1] = g[r].y, gain_[3 * r + 2] = g[r].z;
+    }
+    const S l = region.length_squared;
+    m.xx -= dot(g[0], q[0]), m.yy -= dot(g[1], q[1]), m.zz -= dot(g[2], q[2]);
+    m.xy -= dot(g[0], q[1]), m.xz -= dot(g[0], q[2]), m.yz -= dot(g[1], q[2]);
+    w.xx += l * dot(g[0], g[0]), w.yy += l * dot(g[1], g[1]), w.zz += l * dot(g[2], g[2]);
+    w.xy += l * dot(g[0], g[1]), w.xz += l * dot(g[0], g[2]), w.yz += l * dot(g[1], g[2]);
+    if (damped_inverse(m, w, region.orientation, orientation_)) damped_ = true;
+  }
+
   FLEXCOMP_ONCE S solve_limited(const Vec3<S>& u, const Vec3<S>& v, const Vec3<S>& w, S largest,
                                 S largest_turn, std::array<S, N>& dq) {
     std::array<S, N> turn;
