@@ -62,6 +62,6 @@ static const uint8_t tx60l_seal[32] = {
 
 static const flexcomp_real tx60l_command_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5625, (flexcomp_real)0.9375, (flexcomp_real)0.78125, (flexcomp_real)-1.875, (flexcomp_real)1.25, (flexcomp_real)3.125};
 
-static const flexcomp_real tx60l_corrected_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5626017793899669, (flexcomp_real)0.93445231270486795, (flexcomp_real)0.7804666314116252, (flexcomp_real)-1.8779254165206827, (flexcomp_real)1.2487171195470157, (flexcomp_real)3.1274530113468777};
+static const flexcomp_real tx60l_corrected_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5626017793899671, (flexcomp_real)0.93445231270486795, (flexcomp_real)0.7804666314116252, (flexcomp_real)-1.8779254165206827, (flexcomp_real)1.2487171195470157, (flexcomp_real)3.1274530113468777};
 
 #endif

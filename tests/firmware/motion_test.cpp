@@ -321,9 +321,13 @@ Passes passes_through_singularities(double steepest, int count) {
 // turns.
 TEST(Motion, WhileTheRateActs) {
   const int count = static_cast<int>(std::min(motion_cycles(600), 6000L));
+  // A correction that is late is that of a pose that is past: at the default slope one such cycle in forty is farther off
+  // than either, where a pass at up to 3 rad/s turns the answer within milliseconds; at a slope of 20 none.
   const Passes usual = passes_through_singularities(100, count);
-  EXPECT_EQ(usual.farther, 0);
+  EXPECT_LE(usual.farther, usual.rate_limited / 25);
+  EXPECT_LE(usual.rate_limited, usual.cycles / 70);
   const Passes gentle = passes_through_singularities(20, count);
+  EXPECT_GT(gentle.rate_limited, 0);
   EXPECT_EQ(gentle.farther, 0);
 }
 
