@@ -149,6 +149,27 @@ typedef enum flexcomp_on_refusal {
 } flexcomp_on_refusal;
 
 /** Settings of an arm. */
+/** Greatest bounds of a set (docs/compensation.md, section "Admission"); a set beyond them is refused. For each joint, and
+ * for links, base and tool together with lengths divided by the arm's reach. */
+typedef struct flexcomp_admission {
+  flexcomp_real value_rad;             /**< of functions of readings: sum of their greatest values */
+  flexcomp_real slope;                 /**< of these, rad per rad */
+  flexcomp_real scale;                 /**< of terms proportional to a reading */
+  flexcomp_real direction_rad;         /**< half the jump at a reversal */
+  flexcomp_real compliance_rad_per_nm; /**< by any torque or moment */
+  flexcomp_real rad_per_kg;            /**< by the payload's mass */
+  flexcomp_real rad_per_n;             /**< by the external force */
+  flexcomp_real load_rad;              /**< by all loads at the ranges below */
+  flexcomp_real rad_per_k;             /**< by temperature */
+  flexcomp_real total_slope;           /**< slope, with that of the loads */
+  uint32_t instructions;               /**< of one step, on a Cortex-M7 */
+  flexcomp_real payload_kg;            /**< greatest payload; negative: twice the robot's own, or 5 kg */
+  flexcomp_real com_m;   /**< its greatest distance from the flange; negative: twice the robot's, or 0.2 m */
+  flexcomp_real force_n; /**< greatest external force; negative: 100 N */
+  flexcomp_real temperature_k; /**< greatest distance from the reference; negative: 30 K */
+} flexcomp_admission;
+
+/** Settings of an arm. */
 typedef struct flexcomp_settings {
   flexcomp_real largest_correction_rad;    /**< of any joint */
   flexcomp_real direction_band_rad;        /**< motion after which a joint counts as reversed */
@@ -159,10 +180,11 @@ typedef struct flexcomp_settings {
   uint32_t staging_timeout_ms;             /**< after which an abandoned transfer is dropped */
   uint32_t cycle_us;                       /**< period of the control cycle, told to clients */
   flexcomp_on_refusal on_refusal;          /**< output for a command that cannot be corrected */
+  flexcomp_admission admission;            /**< bounds beyond which a set is refused */
 } flexcomp_settings;
 
 /** Sets the defaults: 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 1000, 60000, 30000 ms, 1000 us,
- * FLEXCOMP_PASS_THROUGH. ANY context; small. */
+ * FLEXCOMP_PASS_THROUGH; admission as in docs/compensation.md. ANY context; small. */
 void flexcomp_settings_default(flexcomp_settings* settings);
 
 /* --- non-volatile memory ------------------------------------------------------------------------- */

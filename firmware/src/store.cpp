@@ -107,7 +107,7 @@ bool Store::load(const Set& set) {
   }
   ImageHeader header;
   std::uint32_t detail = 0;
-  const Refusal r = prepare(set.bytes, sets_.models[set.index], header, detail);
+  const Refusal r = prepare(set.bytes, set.index, header, detail);
   if (r != Refusal::none) {
     refuse(r, detail);
     return false;
@@ -159,7 +159,8 @@ bool Store::free_model(std::uint32_t& index) const {
   return true;
 }
 
-Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail) {
+Refusal Store::prepare(std::uint32_t size, std::uint32_t index, ImageHeader& header, std::uint32_t& detail) {
+  FirmwareModel& model = sets_.models[index];
   detail = 0;
   Refusal r = check_image(staging_.data(), size, nominal_hash_, robot_.name_hash, header);
   if (r != Refusal::none) {
@@ -172,7 +173,9 @@ Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& he
   if (r == Refusal::too_many_terms) detail = FirmwareCapacity::terms;
   if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
   if (r != Refusal::none) return r;
-  return plausible(model, detail) ? Refusal::none : Refusal::implausible;
+  if (!plausible(model, detail)) return Refusal::implausible;
+  return certify(model, settings_.limits, declared_ranges(settings_.ranges, robot_), certificates_[index],
+                 detail);
 }
 
 /// True where the set moves the tool by no more than the plausible change, at 32 poses spread over the joint
@@ -259,7 +262,7 @@ Answer Store::verify(Origin origin) {
   if (!free_model(index)) return answer(Answer::busy);
   ImageHeader header;
   std::uint32_t detail = 0;
-  Refusal r = prepare(announced_, sets_.models[index], header, detail);
+  Refusal r = prepare(announced_, index, header, detail);
   if (r == Refusal::none && header.sequence <= active_.sequence) {
     r = Refusal::stale_sequence;
     detail = active_.sequence;
@@ -571,11 +574,19 @@ bool Store::read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t si
   return true;
 }
 
+/// The model that answers: after a trial that ran out a moment ago, the one that the cycle already uses.
+std::uint32_t Store::used_model() const {
+  return sets_.handover.settled() ? sets_.handover.in_use() : active_.index;
+}
+
 const FirmwareModel* Store::active_model() const {
-  // A trial that ran out a moment ago: the cycle already uses the other one.
-  std::uint32_t index = active_.index;
-  if (sets_.handover.settled()) index = sets_.handover.in_use();
+  const std::uint32_t index = used_model();
   return index == Handover::none ? nullptr : &sets_.models[index];
+}
+
+const FirmwareCertificate* Store::active_certificate() const {
+  const std::uint32_t index = used_model();
+  return index == Handover::none ? nullptr : &certificates_[index];
 }
 
 void Store::status(wire::Status& out) const {

@@ -222,6 +222,8 @@ class Model {
   const Pose<S>& base_pose() const { return base_pose_; }             ///< B with its constant terms
   const std::array<S, 6>& base() const { return base_; }              ///< constant part, m and rad
   const std::array<S, 6>& tool() const { return tool_; }              ///< constant part, m and rad
+  /// Constant parts of the slots of link i (from 0), m and rad.
+  const std::array<S, 6>& constant(std::size_t i) const { return constant_[i]; }
   S lower(std::size_t i) const { return lower_[i]; }                  ///< joint limit, rad
   S upper(std::size_t i) const { return upper_[i]; }                  ///< joint limit, rad
   const Vector3<S>& gravity() const { return gravity_; }              ///< m/s^2, in F0

@@ -91,6 +91,20 @@ class ModbusPdu : public testing::Test {
   Client client{*arm.device, 1};
 };
 
+TEST_F(ModbusPdu, TellsTheCertificateOfTheActiveSet) {
+  ASSERT_EQ(arm.push(make_image(arm.robot, 4)), wire::Answer::accepted);
+  for (const std::uint8_t f : {std::uint8_t{3}, std::uint8_t{4}}) {
+    const Bytes r = client.read(map::certificate, map::certificate_registers, f);
+    ASSERT_EQ(r.size(), 2 + wire::certificate_bytes);
+    wire::CertificateRecord record;
+    wire::decode(r.data() + 2, wire::ByteOrder::big, record);
+    EXPECT_EQ(record.sequence, 4U);
+    EXPECT_EQ(record.position_m, arm.device->certificate().position_m);
+    EXPECT_EQ(record.instructions, arm.device->certificate().instructions);
+  }
+  EXPECT_EQ(client.ask(join({{6}, be({map::certificate, 1})})), exception(6, 2)) << "read only";
+}
+
 TEST_F(ModbusPdu, ChecksQuantityThenAddressThenByteCount) {
   for (const std::uint8_t f : {std::uint8_t{3}, std::uint8_t{4}}) {
     EXPECT_EQ(client.read(0, 0, f), exception(f, 3));

@@ -63,6 +63,10 @@ struct StoreSettings {
   Scalar plausible_position_m = Scalar(0.05);
   /// The same for the orientation, below pi / 2.
   Scalar plausible_orientation_rad = Scalar(0.1);
+  /// A set whose bounds exceed these is refused by the name of a term (docs/compensation.md, section "Admission").
+  AdmissionLimits<Scalar> limits{};
+  /// What the context of a step may say; a negative member: as default_ranges() has it.
+  AdmissionRanges<Scalar> ranges = undeclared_ranges<Scalar>();
   /// Control cycles of a trial where the command names none.
   std::uint32_t trial_cycles = 60000;
   /// Silence after which a transfer is discarded, ms.
@@ -114,6 +118,9 @@ class Store {
   /// The prepared set that is active, or null; valid until the next poll() or run().
   const FirmwareModel* active_model() const;
 
+  /// Bounds of the active set, or null; valid as active_model() is.
+  const FirmwareCertificate* active_certificate() const;
+
   std::uint32_t active_bytes() const { return active_.bytes; }        ///< of the active image
   std::uint32_t active_sequence() const { return active_.sequence; }  ///< 0: none
   std::uint16_t active_slot() const { return active_.slot; }          ///< 0, 1 or wire::no_slot
@@ -158,7 +165,8 @@ class Store {
   bool owns(Origin origin) const { return origin == owner_; }
   void release();
   bool free_model(std::uint32_t& index) const;
-  Refusal prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail);
+  Refusal prepare(std::uint32_t size, std::uint32_t index, ImageHeader& header, std::uint32_t& detail);
+  std::uint32_t used_model() const;
   bool plausible(const FirmwareModel& model, std::uint32_t& detail) const;
   bool read_seal(unsigned slot, Set& set);
   bool load(const Set& set);
@@ -185,6 +193,8 @@ class Store {
   std::uint32_t touched_ms_ = 0;
   std::uint32_t announced_ = 0;
   std::uint32_t staged_ = 0;
+
+  std::array<FirmwareCertificate, 2> certificates_{};  ///< of the models
 
   Set active_{};
   Set previous_{};  ///< what the other slot holds, or what a trial falls back to

@@ -32,6 +32,12 @@
 ///              6  UNSIGNED32      ro      detail
 ///              7  UNSIGNED32      ro      control cycles until a trial reverts
 ///     0x2003   0  DOMAIN          ro      robot record (robot_record.hpp)
+///     0x2004   0  DOMAIN          ro      certificate record of the active set (certificate_record.hpp)
+///     0x2005   0  UNSIGNED8       const   9: certificate as single values
+///              1  UNSIGNED32      ro      instructions of a step, at most
+///              2  REAL32          ro      size of the set at the tool, at most, mm
+///              3  REAL32          ro      the same, orientation, deg
+///            4-9  REAL32          ro      deflection of joint 1 … 6, at most, deg
 ///     0x2010   0  UNSIGNED8       const   2
 ///              1  DOMAIN          wo      image into staging
 ///              2  DOMAIN          ro      active image, byte for byte
@@ -163,6 +169,7 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::unknown_basis:
     case Refusal::bad_place:
     case Refusal::mounting:
+    case Refusal::not_allowed_covariate:
       return abort::incompatible;
     case Refusal::bad_value:
       return abort::value;
@@ -170,6 +177,10 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::table_too_large:
       return abort::out_of_memory;
     case Refusal::implausible:
+    case Refusal::too_large:
+    case Refusal::too_steep:
+    case Refusal::too_compliant:
+    case Refusal::too_costly:
       return abort::value_too_high;
     case Refusal::stale_sequence:
       return abort::value_too_low;

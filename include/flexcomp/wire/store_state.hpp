@@ -42,6 +42,9 @@
 /// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are
 /// 0.
 ///
+/// A refusal by admission (Refusal::too_large and after) has in its detail the index of the term among those that are not
+/// constant, from 0, in the order of the image; Refusal::too_costly the number of instructions.
+///
 /// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). Commands
 /// that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
 /// when they are accepted and then run in the background: the state is `working` until they end, and answer,
