@@ -68,6 +68,13 @@ std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail)
       return fmt::format("{} (of {} bytes)", why, detail);
     case Refusal::stale_sequence:
       return fmt::format("{} ({})", why, detail);
+    case Refusal::too_large:
+    case Refusal::too_steep:
+    case Refusal::too_compliant:
+    case Refusal::not_allowed_covariate:
+      return fmt::format("{} (number {} of those that are not constant)", why, detail + 1);
+    case Refusal::too_costly:
+      return fmt::format("{} ({})", why, detail);
     case Refusal::implausible:
       return fmt::format("{} (by {:.3f} mm or mrad)", why, detail / 1000.0);
     default:

@@ -175,9 +175,9 @@ struct Path {
   std::array<std::uint32_t, kernels> term;  ///< by kind
 };
 /// Sets whose terms all turn joints: at most eight evaluations of loads, seven of terms of other readings.
-constexpr Path joints_only = {10500, 5000, 3500, {0, 1000, 300, 1150, 900, 1150, 1700, 350, 150, 165, 40}};
+constexpr Path joints_only = {10500, 5500, 3500, {0, 1000, 300, 1150, 900, 1150, 1700, 350, 150, 165, 40}};
 /// Sets that also move links, base or tool: three evaluations of all terms.
-constexpr Path off_joints = {20500, 2500, 0, {300, 360, 300, 700, 450, 580, 870, 280, 450, 580, 280}};
+constexpr Path off_joints = {20500, 2700, 0, {300, 360, 300, 700, 450, 580, 870, 280, 450, 580, 280}};
 
 /// True where the term turns the joint whose reading it follows.
 template <class S>
