@@ -165,7 +165,7 @@ typedef struct flexcomp_admission {
   uint32_t instructions;               /**< of one step, on a Cortex-M7 */
   flexcomp_real payload_kg;            /**< greatest payload; negative: twice the robot's own, or 5 kg */
   flexcomp_real com_m;   /**< its greatest distance from the flange; negative: twice the robot's, or 0.2 m */
-  flexcomp_real force_n; /**< greatest external force; negative: 100 N */
+  flexcomp_real force_n; /**< greatest external force; negative: none */
   flexcomp_real temperature_k; /**< greatest distance from the reference; negative: 30 K */
 } flexcomp_admission;
 
@@ -261,9 +261,10 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]);
 
-/** Background work of the store: writing a slot, trials, timeouts. Every 10 ms or so; a commit of n bytes
- * takes about n / 256 + 3 polls. now_ms is any clock that wraps at 32 bits. BACKGROUND; small, and at most
- * one `erase` or one `write` of 256 bytes with one `read` of as many. */
+/** Background work of the store: checking and writing a set, trials, timeouts. Every 10 ms or so; the check of a
+ * set takes 50 to 150 polls, a commit of n bytes n / 256 + 3 more. now_ms is any clock that wraps at 32 bits.
+ * BACKGROUND; at most 20,000 instructions of a Cortex-M7 (default capacity) while a set is checked, else small, and
+ * at most one `erase` or one `write` of 256 bytes with one `read` of as many. */
 void flexcomp_poll(flexcomp_arm* fc, uint32_t now_ms);
 
 /** State of the parameter store and the cycle. */

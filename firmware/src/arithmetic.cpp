@@ -28,9 +28,13 @@ RemainingError remaining_error(const FirmwareModel& model, const Joints& q_rad, 
   return {sqrt(dot<Scalar>(p, p)), sqrt(dot(r, r)), !(trace > Scalar(1))};
 }
 
-Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model) {
-  return model_from_image(image, size, robot, model);
+Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cursor, FirmwareModel& model) {
+  return visit_record<Scalar>(image, size, cursor, ModelBuilder<Scalar, joints, FirmwareCapacity>{model});
 }
+
+void begin_model(const Robot& robot, FirmwareModel& model) { model.begin(robot); }
+
+void finish_model(FirmwareModel& model) { model.finish(); }
 
 }  // namespace firmware
 }  // namespace flexcomp

@@ -87,11 +87,11 @@ template <class S>
 struct AdmissionRanges {
   S payload_kg = S(5);      ///< mass, greatest
   S com_m = S(0.2);         ///< distance of its centre of mass from the flange, greatest
-  S force_n = S(100);       ///< external force at the tool, greatest
+  S force_n = S(0);         ///< external force at the tool, greatest
   S temperature_k = S(30);  ///< distance of the temperature from the reference, greatest
 };
 
-/// Ranges where nothing is declared: twice the robot's own payload, or 5 kg; twice its lever, or 0.2 m; 100 N; 30 K.
+/// Ranges where nothing is declared: twice the robot's own payload, or 5 kg; twice its lever, or 0.2 m; no force; 30 K.
 template <class S, std::size_t N>
 inline AdmissionRanges<S> default_ranges(const NominalRobot<N>& robot) {
   AdmissionRanges<S> r;
@@ -236,7 +236,8 @@ inline std::uint32_t step_instructions(const Model<S, N, Cap>& model) {
 }
 
 /// The bounds of a prepared set, term by term: begin(), then advance() until it is false, then finish(). Between
-/// begin() and finish() the model must stay as it is. Work of one call: one term, its table read once.
+/// begin() and finish() the model must stay as it is. Work of one call: one term, of a grid one of three passes over its
+/// table.
 template <class S, std::size_t N = 6>
 class Admission {
  public:
@@ -250,26 +251,33 @@ class Admission {
     refusal_ = Refusal::none;
     next_ = 0;
     searching_ = false;
+    stage_ = 0;
     greatest_ = S(-1);
     measure_arm(model, ranges);
     add_constants(model);
   }
 
-  /// Adds the next term to the bounds; false where there is none left or the set is refused.
+  /// Adds the next term, or a part of it, to the bounds; false where there is none left or the set is refused.
   template <class Cap>
   bool advance(const Model<S, N, Cap>& model) {
     if (next_ >= model.effect_count()) return false;
-    const std::size_t k = next_++;
-    Share share;
-    const std::size_t place = place_of(model.effect(k));
-    if (model.effect(k).place.body != body::point && !bound(model, model.effect(k), share)) {
+    const Term<S>& term = model.effect(next_);
+    const std::size_t place = place_of(term);
+    Share& share = share_;
+    if (stage_ == 0) share.fill(S(0));
+    if (term.place.body != body::point && !bound(model, term, share)) {
       refusal_ = Refusal::not_allowed_covariate;
       excess_.place = place;
-      excess_.term = k;
+      excess_.term = next_;
       next_ = model.effect_count();
       return false;
     }
-    const Term<S>& term = model.effect(k);
+    if (term.basis == Basis::grid && stage_ < 2) {
+      ++stage_;
+      return true;
+    }
+    stage_ = 0;
+    const std::size_t k = next_++;
     if (!searching_ && term.place.body != body::point)
       add_size(term.place, share[static_cast<std::size_t>(Measure::deflection)]);
     if (is_length(term.place)) {
@@ -282,6 +290,7 @@ class Admission {
     if (term.basis == Basis::thermal && !(magnitude(term.coefficient) <= limits_.rad_per_k)) {
       refuse(Measure::per_k, place, magnitude(term.coefficient));
       excess_.term = k;
+      next_ = model.effect_count();
       return false;
     }
     add(place, share);
@@ -293,6 +302,12 @@ class Admission {
       return true;
     }
     return next_ < model.effect_count();
+  }
+
+  /// True where the next call of advance() reads a grid, which takes as long as several other terms.
+  template <class Cap>
+  bool at_grid(const Model<S, N, Cap>& model) const {
+    return next_ < model.effect_count() && model.effect(next_).basis == Basis::grid;
   }
 
   /// Fills the certificate; the verdict. `detail` is the term's index, or the number of instructions.
@@ -477,54 +492,58 @@ class Admission {
     slope *= S(static_cast<float>(m)) * S(0.15915494309189533577);
   }
 
-  /// Shares of a grid: a cell's value lies within those of its corners, its slope along a side within those of its edges.
+  /// Shares of a grid in three passes: a cell's value lies within those of its corners, its slope along a side within those
+  /// of its edges.
   bool grid_bound(const Table& table, const S* nodes, const S& k, Share& share) const {
     const S* v = nodes + table.rows + table.columns;
-    S greatest = S(0);
-    for (std::size_t n = 0; n < std::size_t{table.rows} * table.columns; ++n) {
-      if (!(magnitude(v[n]) <= greatest)) greatest = magnitude(v[n]);
-    }
-    put(share, Measure::value, k * greatest);
-    put(share, Measure::deflection, k * greatest);
-    for (int side = 0; side < 2; ++side) {
-      const bool along_rows = side == 0;
-      const Covariate kind = along_rows ? table.row_covariate : table.column_covariate;
-      if (kind == Covariate::time || kind == Covariate::relative_speed) return false;
-      const S* x = along_rows ? nodes : nodes + table.rows;
-      const std::size_t count = along_rows ? table.rows : table.columns;
-      const std::size_t lines = along_rows ? table.columns : table.rows;
-      const std::size_t step = along_rows ? table.columns : 1;
-      const std::size_t line = along_rows ? 1 : table.columns;
-      S steepest = S(0), widest = S(0);
-      for (std::size_t n = 0; n < lines; ++n) {
-        const S* at = v + n * line;
-        S low = at[0], high = at[0];
-        for (std::size_t i = 1; i < count; ++i) {
-          const S y = at[i * step];
-          const S slope = magnitude(y - at[(i - 1) * step]) / (x[i] - x[i - 1]);
-          if (!(slope <= steepest)) steepest = slope;
-          if (y < low) low = y;
-          if (y > high) high = y;
-        }
-        if (!(high - low <= widest)) widest = high - low;
+    if (stage_ == 0) {
+      S greatest = S(0);
+      for (std::size_t n = 0; n < std::size_t{table.rows} * table.columns; ++n) {
+        if (!(magnitude(v[n]) <= greatest)) greatest = magnitude(v[n]);
       }
-      switch (kind) {
-        case Covariate::joint_position:
-          put(share, Measure::slope, k * steepest);
-          put(share, Measure::total_slope, k * steepest);
-          break;
-        case Covariate::payload:
-          put(share, Measure::per_kg, k * steepest);
-          break;
-        case Covariate::temperature:
-          put(share, Measure::per_k, k * steepest);
-          break;
-        default:
-          put(share, Measure::direction, k * widest * S(0.5));
-          break;
-      }
+      put(share, Measure::value, k * greatest);
+      put(share, Measure::deflection, k * greatest);
+      return true;
     }
-    return true;
+    const bool along_rows = stage_ == 1;
+    const Covariate kind = along_rows ? table.row_covariate : table.column_covariate;
+    const S* x = along_rows ? nodes : nodes + table.rows;
+    const std::size_t count = along_rows ? table.rows : table.columns;
+    const std::size_t lines = along_rows ? table.columns : table.rows;
+    const std::size_t step = along_rows ? table.columns : 1;
+    const std::size_t line = along_rows ? 1 : table.columns;
+    S steepest = S(0), widest = S(0);
+    for (std::size_t n = 0; n < lines; ++n) {
+      const S* at = v + n * line;
+      S low = at[0], high = at[0];
+      for (std::size_t i = 1; i < count; ++i) {
+        const S y = at[i * step];
+        const S slope = magnitude(y - at[(i - 1) * step]) / (x[i] - x[i - 1]);
+        if (!(slope <= steepest)) steepest = slope;
+        if (y < low) low = y;
+        if (y > high) high = y;
+      }
+      if (!(high - low <= widest)) widest = high - low;
+    }
+    switch (kind) {
+      case Covariate::joint_position:
+        put(share, Measure::slope, k * steepest);
+        put(share, Measure::total_slope, k * steepest);
+        return true;
+      case Covariate::payload:
+        put(share, Measure::per_kg, k * steepest);
+        return true;
+      case Covariate::temperature:
+        put(share, Measure::per_k, k * steepest);
+        return true;
+      case Covariate::direction:
+        put(share, Measure::direction, k * widest * S(0.5));
+        return true;
+      case Covariate::time:
+      case Covariate::relative_speed:
+        break;
+    }
+    return false;
   }
 
   /// Slope of a link-weight lever (M13), rad per rad, summed over the readings: the joints before it turn gravity; those
@@ -562,7 +581,6 @@ class Admission {
   /// Shares of one term; false where it follows time or speed.
   template <class Cap>
   bool bound(const Model<S, N, Cap>& model, const Term<S>& t, Share& share) const {
-    share.fill(S(0));
     const S k = magnitude(t.coefficient);
     switch (t.basis) {
       case Basis::one:
@@ -717,6 +735,8 @@ class Admission {
   S greatest_ = S(-1);
   Refusal refusal_ = Refusal::none;
   bool searching_ = false;
+  unsigned stage_ = 0;  ///< of the next term, where it is a grid
+  Share share_{};       ///< of the next term, so far
   std::size_t next_ = 0;
   std::size_t last_ = 0;
 };

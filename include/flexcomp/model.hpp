@@ -218,10 +218,10 @@ class Model {
   const LinkShape<S>& nominal(std::size_t i) const { return nominal_[i]; }  ///< link i (from 0) without terms
   const LinkShape<S>& shape(std::size_t i) const { return shape_[i]; }  ///< link i with its constant terms
   const Pose<S>& nominal_tool() const { return nominal_tool_; }         ///< Ftool in F6 without terms
-  const Pose<S>& tool_pose() const { return tool_pose_; }             ///< Ftool in F6 with its constant terms
-  const Pose<S>& base_pose() const { return base_pose_; }             ///< B with its constant terms
-  const std::array<S, 6>& base() const { return base_; }              ///< constant part, m and rad
-  const std::array<S, 6>& tool() const { return tool_; }              ///< constant part, m and rad
+  const Pose<S>& tool_pose() const { return tool_pose_; }  ///< Ftool in F6 with its constant terms
+  const Pose<S>& base_pose() const { return base_pose_; }  ///< B with its constant terms
+  const std::array<S, 6>& base() const { return base_; }   ///< constant part, m and rad
+  const std::array<S, 6>& tool() const { return tool_; }   ///< constant part, m and rad
   /// Constant parts of the slots of link i (from 0), m and rad.
   const std::array<S, 6>& constant(std::size_t i) const { return constant_[i]; }
   S lower(std::size_t i) const { return lower_[i]; }                  ///< joint limit, rad
@@ -318,15 +318,12 @@ class Model {
     }
     std::size_t n = 0;
     for (std::uint8_t g = 0; g < detail::group::count; ++g) {
-      for (std::size_t k = 0; k < effect_count_; ++k) {
-        if (group[k] != g) continue;
-        std::size_t at = n++;
-        // Equal levers side by side, so that each is taken once.
-        if (g == detail::group::lever) {
-          for (; at > 0 && comes_before(effects_[k], effects_[order_[at - 1]]); --at)
-            order_[at] = order_[at - 1];
+      if (g == detail::group::lever) {
+        n = order_levers(group);
+      } else {
+        for (std::size_t k = 0; k < effect_count_; ++k) {
+          if (group[k] == g) order_[n++] = static_cast<Count>(k);
         }
-        order_[at] = static_cast<Count>(k);
       }
       group_end_[g] = static_cast<Count>(n);
     }
@@ -362,8 +359,20 @@ class Model {
     base_twist_ = twist_between(Pose<S>(), base_pose_);
   }
 
-  static bool comes_before(const Term<S>& a, const Term<S>& b) {
-    return a.joint != b.joint ? a.joint < b.joint : a.distal_joint < b.distal_joint;
+  /// Orders the levers, the first group, by joint and distal joint, so that each is taken once; their number. Counting
+  /// sort: work linear in the terms.
+  std::size_t order_levers(const std::array<std::uint8_t, Cap::terms>& group) {
+    const auto key = [this](std::size_t k) { return effects_[k].joint * N + effects_[k].distal_joint; };
+    std::array<Count, N * N + 1> start{};
+    for (std::size_t k = 0; k < effect_count_; ++k) {
+      if (group[k] == detail::group::lever) ++start[key(k) + 1];
+    }
+    for (std::size_t i = 0; i < N * N; ++i) start[i + 1] = static_cast<Count>(start[i + 1] + start[i]);
+    const std::size_t count = start[N * N];
+    for (std::size_t k = 0; k < effect_count_; ++k) {
+      if (group[k] == detail::group::lever) order_[start[key(k)]++] = static_cast<Count>(k);
+    }
+    return count;
   }
 
   static bool is_zero(double v) { return bits_of(v) << 1U == 0; }

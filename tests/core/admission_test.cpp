@@ -257,6 +257,13 @@ std::array<double, 7> effects_at(const flexcomp::Model<double>& model, const arm
   return out;
 }
 
+/// Ranges of an arm that also presses.
+AdmissionRanges<double> wide_ranges(const arms::Robot& robot) {
+  AdmissionRanges<double> r = flexcomp::default_ranges<double>(robot);
+  r.force_n = 60;
+  return r;
+}
+
 /// Terms of every kind that may be admitted, made smaller until they are.
 TermSet<double> random_admitted(const arms::Arm& arm, arms::Random& random, std::size_t effects,
                                 Certificate<double>& certificate) {
@@ -289,8 +296,7 @@ TermSet<double> random_admitted(const arms::Arm& arm, arms::Random& random, std:
     auto model = std::make_unique<flexcomp::Model<double>>();
     EXPECT_EQ(model->prepare(arm.robot, set.list()), Refusal::none);
     std::uint32_t detail = 0;
-    if (flexcomp::certify(*model, limits, flexcomp::default_ranges<double>(arm.robot), certificate, detail) ==
-        Refusal::none)
+    if (flexcomp::certify(*model, limits, wide_ranges(arm.robot), certificate, detail) == Refusal::none)
       return set;
     for (auto& t : set.terms) {
       if (t.basis != Basis::one) t.coefficient *= 0.8;
@@ -302,7 +308,7 @@ TEST(Admission, BoundsHoldOverAllPosesAndContexts) {
   double tightest[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
   int sets = 0;
   for (const arms::Arm& arm : arms::all()) {
-    const AdmissionRanges<double> ranges = flexcomp::default_ranges<double>(arm.robot);
+    const AdmissionRanges<double> ranges = wide_ranges(arm.robot);
     arms::Random random(17);
     for (int n = 0; n < 60 / arms::part + 1; ++n) {
       Certificate<double> c;
@@ -358,7 +364,7 @@ TEST(Admission, BoundsHoldOverAllPosesAndContexts) {
 
 TEST(Admission, SensitivitiesHold) {
   for (const arms::Arm& arm : arms::all()) {
-    const AdmissionRanges<double> ranges = flexcomp::default_ranges<double>(arm.robot);
+    const AdmissionRanges<double> ranges = wide_ranges(arm.robot);
     arms::Random random(23);
     for (int n = 0; n < 40 / arms::part + 1; ++n) {
       Certificate<double> c;

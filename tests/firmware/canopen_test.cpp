@@ -251,7 +251,11 @@ TEST_F(Canopen, AbortCodes) {
 TEST_F(Canopen, RefusalsOfASet) {
   const auto refused = [this](const Bytes& image) {
     EXPECT_EQ(download(co::image, 1, image), 0U);
-    return command(Command::verify);
+    EXPECT_EQ(command(Command::verify), 0U) << "it takes a while";
+    EXPECT_EQ(number(co::status_summary, 1), static_cast<std::uint32_t>(wire::StoreState::working));
+    arm.until_done();
+    return co::abort_code(static_cast<Answer>(number(co::status_summary, 2)),
+                          static_cast<Refusal>(number(co::status_summary, 3)));
   };
   const Bytes good = make_image(arm.robot, 1);
   Bytes bad = good;

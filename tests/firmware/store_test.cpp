@@ -249,7 +249,7 @@ TEST(Store, TellsTheBoundsOfTheActiveSetOnly) {
   EXPECT_GT(one.instructions, 10000U);
   EXPECT_GT(double_of(one.position_m), 1e-4);
   arm.stage(make_image(arm.robot, 2, 2));
-  arm.run(Command::verify);
+  ASSERT_EQ(arm.verify(), Answer::accepted);
   EXPECT_EQ(arm.device->certificate().position_m, one.position_m) << "what is staged is not what runs";
   arm.run(Command::commit);
   arm.settle();
@@ -282,7 +282,7 @@ TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
   EXPECT_EQ(state(arm), StoreState::idle);
 
   arm.stage(second);
-  arm.run(Command::verify);
+  ASSERT_EQ(arm.verify(), Answer::accepted);
   store.poll(arm.now_ms);
   store.poll(arm.now_ms + 30000);  // left alone too long
   EXPECT_EQ(state(arm), StoreState::idle);
@@ -290,6 +290,82 @@ TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
 
   EXPECT_EQ(arm.flash.slots, before);
   EXPECT_EQ(arm.pull(), first);
+}
+
+TEST(Store, ChecksInSlicesAndSaysWorkingMeanwhile) {
+  Arm arm;
+  arm.stage(make_image(arm.robot, 1));
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  unsigned polls = 0;
+  for (; state(arm) == StoreState::working && polls < 1000; ++polls) {
+    EXPECT_EQ(arm.device->status().answer, static_cast<std::uint16_t>(Answer::accepted));
+    EXPECT_EQ(arm.run(Command::verify), Answer::accepted) << "the same client asks again";
+    EXPECT_EQ(arm.run(Command::verify, 0, 2), Answer::busy);
+    EXPECT_EQ(arm.run(Command::begin, 100), Answer::busy);
+    arm.run(Command::verify);
+    arm.device->store().poll(++arm.now_ms);
+  }
+  EXPECT_EQ(state(arm), StoreState::verified);
+  EXPECT_GT(polls, 36U) << "32 probe poses, and the rest";
+  EXPECT_EQ(arm.run(Command::abort), Answer::accepted);
+}
+
+TEST(Store, ACommitDuringACheckFollowsByItself) {
+  Arm arm;
+  const Bytes image = make_image(arm.robot, 1);
+  arm.stage(image);
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  arm.device->store().poll(++arm.now_ms);
+  EXPECT_EQ(arm.run(Command::commit, 0, 2), Answer::busy);
+  EXPECT_EQ(arm.run(Command::commit), Answer::accepted);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::accepted);
+  EXPECT_EQ(arm.pull(), image);
+  // And of what is refused nothing is written.
+  const unsigned erased = arm.flash.erased_slots;
+  Bytes bad = make_image(arm.robot, 2);
+  bad[120] ^= 1U;
+  arm.stage(bad);
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  EXPECT_EQ(arm.run(Command::commit), Answer::accepted);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::refused);
+  EXPECT_EQ(state(arm), StoreState::idle);
+  EXPECT_EQ(arm.flash.erased_slots, erased);
+  EXPECT_EQ(arm.sequence(), 1U);
+}
+
+TEST(Store, ACheckIsGivenUpByItsClient) {
+  Arm arm;
+  for (const bool by_command : {true, false}) {
+    arm.stage(make_image(arm.robot, 1));
+    EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+    arm.device->store().poll(++arm.now_ms);
+    EXPECT_EQ(arm.run(Command::abort, 0, 2), Answer::busy);
+    if (by_command) {
+      EXPECT_EQ(arm.run(Command::abort), Answer::accepted);
+    } else {
+      arm.device->store().disconnect(2);
+      EXPECT_EQ(state(arm), StoreState::working);
+      arm.device->store().disconnect(1);
+    }
+    EXPECT_EQ(state(arm), StoreState::idle);
+    arm.settle();
+    EXPECT_EQ(arm.run(Command::commit), Answer::wrong_state);
+  }
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 1)), Refusal::none);
+}
+
+TEST(Store, ARollbackChecksBeforeItErases) {
+  Arm arm;
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 2, 1, 2)), Answer::accepted);
+  for (auto& slot : arm.flash.slots) {
+    if (load_u32(slot.data() + 12) == 1) slot[200] ^= 1U;  // damaged since
+  }
+  EXPECT_EQ(arm.run(Command::rollback), Answer::accepted);
+  EXPECT_EQ(state(arm), StoreState::working);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::no_previous);
+  EXPECT_EQ(arm.sequence(), 2U);
+  EXPECT_EQ(arm.pull(), make_image(arm.robot, 2, 1, 2));
 }
 
 TEST(Store, OneClientAtATime) {

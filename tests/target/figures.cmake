@@ -53,7 +53,8 @@ set_tests_properties(target/instructions_are_compared PROPERTIES
 add_test(NAME target/budget COMMAND ${counting} $<TARGET_FILE:budget>)
 set_tests_properties(target/budget PROPERTIES TIMEOUT 60 LABELS target)
 add_test(NAME target/step_cost COMMAND ${counting} $<TARGET_FILE:target_step_cost>)
-set_tests_properties(target/step_cost PROPERTIES TIMEOUT 60 LABELS target)
+add_test(NAME target/check_slices COMMAND ${counting} $<TARGET_FILE:target_check_slices>)
+set_tests_properties(target/step_cost target/check_slices PROPERTIES TIMEOUT 60 LABELS target)
 add_custom_target(instructions COMMAND ${figures} instructions update ${instructions_of} VERBATIM)
 
 # The call graph's answer against a run.

@@ -54,7 +54,8 @@
 /// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length,
 ///   otherwise the length is known at the end. It goes to staging only; an aborted or timed-out transfer
 ///   leaves nothing behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
-/// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
+/// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest. What comes
+///   out in the background (verify, commit and so on) is only there: poll 0x2002:1 until it is not 3.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by the fade-in,
 ///   because between the two a controller would run a set that it can no longer read back.
 /// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
