@@ -515,13 +515,16 @@ class Admission {
     S steepest = S(0), widest = S(0);
     for (std::size_t n = 0; n < lines; ++n) {
       const S* at = v + n * line;
-      S low = at[0], high = at[0];
+      S low = at[0], high = at[0], before = at[0], from = x[0];
       for (std::size_t i = 1; i < count; ++i) {
-        const S y = at[i * step];
-        const S slope = magnitude(y - at[(i - 1) * step]) / (x[i] - x[i - 1]);
+        at += step;
+        const S y = *at, to = x[i];
+        const S slope = magnitude(y - before) / (to - from);
         if (!(slope <= steepest)) steepest = slope;
         if (y < low) low = y;
         if (y > high) high = y;
+        before = y;
+        from = to;
       }
       if (!(high - low <= widest)) widest = high - low;
     }
