@@ -4,9 +4,8 @@
  *
  * One loop does all. It looks at the clock before anything else, and between two looks it makes at most one call
  * into the library for the bus or the store. Bus traffic, however dense, therefore delays a cycle by no more than
- * the longest of these calls. Most of them are small; but a whole set is checked in one call, at its commit and at
- * a rollback, which takes many times as long as a step. Where that is longer than the period, a push costs this
- * loop a cycle, which it leaves out.
+ * the longest of these calls: a slice of the check of a set, at most 20,000 instructions, or a probe, which takes
+ * as long as a step.
  *
  * Where your processor has a timer interrupt, control_cycle() belongs into it, and nothing delays it at all:
  * flexcomp_step() may interrupt everything else here at any point (flexcomp.h, "Threads"). It is polled here

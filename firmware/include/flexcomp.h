@@ -73,7 +73,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
   (400 * sizeof(flexcomp_real) + FLEXCOMP_TERMS * (20 + 2 * sizeof(flexcomp_real)) + FLEXCOMP_TABLES * 12 + \
    FLEXCOMP_TABLE_VALUES * sizeof(flexcomp_real))
 /** Memory of one arm: staging, two sets, and the rest. */
-#define FLEXCOMP_MEMORY_BYTES (2816 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
+#define FLEXCOMP_MEMORY_BYTES (3840 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
 /** Memory of one CANopen node. */
 #define FLEXCOMP_CAN_BYTES 1088
 /** Memory of one Modbus serial line. */
@@ -152,6 +152,27 @@ typedef enum flexcomp_on_refusal {
 } flexcomp_on_refusal;
 
 /** Settings of an arm. */
+/** Greatest bounds of a set (docs/compensation.md, section "Admission"); a set beyond them is refused. For each joint, and
+ * for links, base and tool together with lengths divided by the arm's reach. */
+typedef struct flexcomp_admission {
+  flexcomp_real value_rad;             /**< of functions of readings: sum of their greatest values */
+  flexcomp_real slope;                 /**< of these, rad per rad */
+  flexcomp_real scale;                 /**< of terms proportional to a reading */
+  flexcomp_real direction_rad;         /**< half the jump at a reversal */
+  flexcomp_real compliance_rad_per_nm; /**< by any torque or moment */
+  flexcomp_real rad_per_kg;            /**< by the payload's mass */
+  flexcomp_real rad_per_n;             /**< by the external force */
+  flexcomp_real load_rad;              /**< by all loads at the ranges below */
+  flexcomp_real rad_per_k;             /**< by temperature */
+  flexcomp_real total_slope;           /**< slope, with that of the loads */
+  uint32_t instructions;               /**< of one step, on a Cortex-M7 */
+  flexcomp_real payload_kg;            /**< greatest payload; negative: twice the robot's own, or 5 kg */
+  flexcomp_real com_m;   /**< its greatest distance from the flange; negative: twice the robot's, or 0.2 m */
+  flexcomp_real force_n; /**< greatest external force; negative: none */
+  flexcomp_real temperature_k; /**< greatest distance from the reference; negative: 30 K */
+} flexcomp_admission;
+
+/** Settings of an arm. */
 typedef struct flexcomp_settings {
   flexcomp_real largest_correction_rad;    /**< of any joint */
   flexcomp_real direction_band_rad;        /**< motion after which a joint counts as reversed */
@@ -167,10 +188,11 @@ typedef struct flexcomp_settings {
   uint32_t staging_timeout_ms;              /**< after which an abandoned transfer is dropped */
   uint32_t cycle_us;                        /**< period of the control cycle: rates are bounded by it */
   flexcomp_on_refusal on_refusal;           /**< output for a command that cannot be corrected */
+  flexcomp_admission admission;             /**< bounds beyond which a set is refused */
 } flexcomp_settings;
 
 /** Sets the defaults: 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 2 rad/s, 0.5 rad/s, 20 rad/s^2, 60000, 30000 ms,
- * 1000 us, FLEXCOMP_HOLD_LAST_OUTPUT. ANY context; small. */
+ * 1000 us, FLEXCOMP_HOLD_LAST_OUTPUT; admission as in docs/compensation.md. ANY context; small. */
 void flexcomp_settings_default(flexcomp_settings* settings);
 
 /* --- non-volatile memory ------------------------------------------------------------------------- */
@@ -281,9 +303,10 @@ typedef enum flexcomp_step_flag {
  * and the status FLEXCOMP_OK. BOTH contexts; small. */
 uint32_t flexcomp_step_flags(const flexcomp_arm* fc);
 
-/** Background work of the store: writing a slot, trials, timeouts. Every 10 ms or so; a commit of n bytes
- * takes about n / 256 + 3 polls. now_ms is any clock that wraps at 32 bits. BACKGROUND; small, and at most
- * one `erase` or one `write` of 256 bytes with one `read` of as many. */
+/** Background work of the store: checking and writing a set, trials, timeouts. Every 10 ms or so; the check of a
+ * set takes 50 to 150 polls, a commit of n bytes n / 256 + 3 more. now_ms is any clock that wraps at 32 bits.
+ * BACKGROUND; at most 20,000 instructions of a Cortex-M7 (default capacity) while a set is checked, else small, and
+ * at most one `erase` or one `write` of 256 bytes with one `read` of as many. */
 void flexcomp_poll(flexcomp_arm* fc, uint32_t now_ms);
 
 /** State of the parameter store and the cycle. */

@@ -17,9 +17,13 @@ RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints&
   return flexcomp::remaining_error<Scalar>(model, q_rad, q_command_rad, context);
 }
 
-Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model) {
-  return model_from_image(image, size, robot, model);
+Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cursor, FirmwareModel& model) {
+  return visit_record<Scalar>(image, size, cursor, ModelBuilder<Scalar, joints, FirmwareCapacity>{model});
 }
+
+void begin_model(const Robot& robot, FirmwareModel& model) { model.begin(robot); }
+
+void finish_model(FirmwareModel& model) { model.finish(); }
 
 }  // namespace firmware
 }  // namespace flexcomp

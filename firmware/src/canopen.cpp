@@ -462,6 +462,12 @@ std::uint32_t CanopenNode::get(std::uint32_t& size) {
     case co::robot:
       device_.robot_record(ByteOrder::little, out);
       return co::abort::none;
+    case co::certificate:
+      wire::encode(device_.certificate(), ByteOrder::little, out);
+      return co::abort::none;
+    case co::certificate_summary:
+      number = sub_ == 0 ? 9U : device_.certificate_summary(sub_);
+      break;
     case co::status_summary: {
       const wire::Status s = device_.status();
       const std::uint32_t values[8] = {7,        s.state,           s.answer, s.refusal,

@@ -119,6 +119,47 @@ wire::Status Device::status() const {
   return s;
 }
 
+wire::CertificateRecord Device::certificate() const {
+  wire::CertificateRecord r;
+  r.most_instructions = settings_.store.limits.instructions;
+  const FirmwareCertificate* c = store_.active_certificate();
+  if (c == nullptr) return r;
+  for (std::size_t j = 0; j < joints; ++j) {
+    r.deflection_rad[j] = to_binary64_bits(c->deflection_rad[j]);
+    r.slope[j] = to_binary64_bits(c->slope[j]);
+  }
+  r.off_joint_rad = to_binary64_bits(c->off_joint_rad);
+  r.off_joint_slope = to_binary64_bits(c->off_joint_slope);
+  r.rad_per_kg = to_binary64_bits(c->rad_per_kg);
+  r.rad_per_n = to_binary64_bits(c->rad_per_n);
+  r.rad_per_m = to_binary64_bits(c->rad_per_m);
+  r.rad_per_k = to_binary64_bits(c->rad_per_k);
+  r.position_m = to_binary64_bits(c->position_m);
+  r.orientation_rad = to_binary64_bits(c->orientation_rad);
+  r.reach_m = to_binary64_bits(c->reach_m);
+  r.instructions = c->instructions;
+  r.sequence = store_.active_sequence();
+  return r;
+}
+
+std::uint32_t Device::certificate_summary(std::size_t sub) const {
+  constexpr float degrees = 57.29577951F;
+  const FirmwareCertificate* c = store_.active_certificate();
+  if (c == nullptr) return 0;
+  if (sub == 1) return c->instructions;
+  float v = 0;
+  if (sub == 2) {
+    v = static_cast<float>(c->position_m) * 1000.0F;
+  } else if (sub == 3) {
+    v = static_cast<float>(c->orientation_rad) * degrees;
+  } else if (sub < 4 + joints) {
+    v = static_cast<float>(c->deflection_rad[sub - 4]) * degrees;
+  }
+  std::uint32_t bits;
+  std::memcpy(&bits, &v, sizeof bits);
+  return bits;
+}
+
 float Device::correction_deg(std::size_t joint) const {
   constexpr float degrees = 57.29577951F;
   const ControlPublication& p = cycle_.publication();

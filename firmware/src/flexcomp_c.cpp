@@ -200,6 +200,12 @@ void flexcomp_settings_default(flexcomp_settings* settings) {
   settings->staging_timeout_ms = d.store.staging_timeout_ms;
   settings->cycle_us = d.control.motion.cycle_us;
   settings->on_refusal = FLEXCOMP_HOLD_LAST_OUTPUT;
+  flexcomp_admission& a = settings->admission;
+  const flexcomp::AdmissionLimits<fw::Scalar>& l = d.store.limits;
+  const flexcomp::AdmissionRanges<fw::Scalar>& r = d.store.ranges;
+  a = {l.value_rad,    l.slope,      l.scale,    l.direction_rad, l.compliance_rad_per_nm,
+       l.rad_per_kg,   l.rad_per_n,  l.load_rad, l.rad_per_k,     l.total_slope,
+       l.instructions, r.payload_kg, r.com_m,    r.force_n,       r.temperature_k};
 }
 
 flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
@@ -225,6 +231,11 @@ flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* rob
   d.store.plausible_orientation_rad = s.plausible_orientation_rad;
   d.store.trial_cycles = s.trial_cycles;
   d.store.staging_timeout_ms = s.staging_timeout_ms;
+  const flexcomp_admission& a = s.admission;
+  d.store.limits = {a.value_rad,   a.slope,     a.scale,    a.direction_rad, a.compliance_rad_per_nm,
+                    a.rad_per_kg,  a.rad_per_n, a.load_rad, a.rad_per_k,     a.total_slope,
+                    a.instructions};
+  d.store.ranges = {a.payload_kg, a.com_m, a.force_n, a.temperature_k};
   d.name = robot->name;
   return reinterpret_cast<flexcomp_arm*>(new (memory) Arm(nominal, storage != nullptr ? *storage : none, d));
 }

@@ -160,6 +160,9 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
       case Block::robot:
         device_.robot_record(wire::ByteOrder::big, scratch);
         break;
+      case Block::certificate:
+        wire::encode(device_.certificate(), wire::ByteOrder::big, scratch);
+        break;
       case Block::staging_window:
         return Exception::illegal_data_address;
     }
@@ -218,6 +221,7 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, con
     case Block::probe_response:
     case Block::corrections:
     case Block::robot:
+    case Block::certificate:
       break;
   }
   return Exception::illegal_data_address;

@@ -20,6 +20,11 @@ constexpr std::uint32_t seal_offset = slot_bytes - seal_bytes;
 constexpr std::uint32_t unit_bytes = 32;    ///< non-volatile memory is written in multiples of this
 constexpr std::uint32_t chunk_bytes = 256;  ///< most bytes per call
 constexpr std::uint8_t seal_magic[4] = {'F', 'L', 'X', 'S'};
+// Of one slice of a check. The instructions are those of a Cortex-M7.
+constexpr std::uint32_t checksum_bytes = 1024;  ///< 10 instructions each
+constexpr unsigned records_at_once = 16;        ///< terms; a table counts for as many
+constexpr unsigned bounds_at_once = 4;          ///< terms; a part of a grid counts for as many
+constexpr std::uint32_t probe_poses = 32;       ///< one at a time
 constexpr std::uint32_t shortest_image = image::header_bytes + image::crc_bytes;
 
 std::uint32_t rounded_up(std::uint32_t size) { return (size + unit_bytes - 1U) / unit_bytes * unit_bytes; }
@@ -105,14 +110,21 @@ bool Store::load(const Set& set) {
     faults_ |= wire::fault::storage;
     return false;
   }
-  ImageHeader header;
+  begin_check(set.bytes, set.index);
+  Refusal r = Refusal::none;
   std::uint32_t detail = 0;
-  const Refusal r = prepare(set.bytes, sets_.models[set.index], header, detail);
+  while (!check_slice(r, detail)) {
+  }
   if (r != Refusal::none) {
     refuse(r, detail);
     return false;
   }
-  return header.sequence == set.sequence && load_u32(staging_.data() + set.bytes - 4) == set.crc;
+  return is_in_staging(set);
+}
+
+/// True where the image that was checked is the one that the seal was written for.
+bool Store::is_in_staging(const Set& set) const {
+  return header_.sequence == set.sequence && load_u32(staging_.data() + set.bytes - 4) == set.crc;
 }
 
 void Store::boot() {
@@ -159,46 +171,150 @@ bool Store::free_model(std::uint32_t& index) const {
   return true;
 }
 
-Refusal Store::prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail) {
-  detail = 0;
-  Refusal r = check_image(staging_.data(), size, nominal_hash_, robot_.name_hash, header);
-  if (r != Refusal::none) {
-    if (r == Refusal::schema) detail = header.schema_major;
-    if (r == Refusal::truncated || r == Refusal::bad_length) detail = header.total_bytes;
-    return r;
-  }
-  r = build_model(staging_.data(), size, robot_, model);
-  if (r == Refusal::unknown_basis) detail = unknown_basis(staging_.data(), size);
-  if (r == Refusal::too_many_terms) detail = FirmwareCapacity::terms;
-  if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
-  if (r != Refusal::none) return r;
-  return plausible(model, detail) ? Refusal::none : Refusal::implausible;
+void Store::begin_check(std::uint32_t size, std::uint32_t index) {
+  check_ = Check::header;
+  check_bytes_ = size;
+  check_index_ = index;
+  progress_ = 0;
 }
 
-/// True where the set moves the tool by no more than the plausible change, at 32 poses spread over the joint
-/// limits.
-bool Store::plausible(const FirmwareModel& model, std::uint32_t& detail) const {
-  FirmwareContext context = default_context<Scalar>(robot_);
-  for (std::uint32_t pose = 1; pose <= 32; ++pose) {
-    Joints q;
-    for (std::size_t j = 0; j < joints; ++j) {
-      const Scalar low = from_binary64<Scalar>(robot_.limits[j].min_rad);
-      const Scalar high = from_binary64<Scalar>(robot_.limits[j].max_rad);
-      q[j] = low + (high - low) * spread(pose, j);
-      context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
-      context.relative_speed[j] = context.direction[j];
-    }
-    const RemainingError<Scalar> change = remaining_error(model, q, q, context);
-    if (!(change.position_m <= settings_.plausible_position_m)) {
-      detail = micro(change.position_m);
+/// The next slice of the check of what is in the staging memory; true where it was the last one, `r` is then the verdict.
+bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
+  FirmwareModel& model = sets_.models[check_index_];
+  const std::uint8_t* image = staging_.data();
+  detail = 0;
+  switch (check_) {
+    case Check::header:
+      r = read_header(image, check_bytes_, header_);
+      if (r == Refusal::schema) detail = header_.schema_major;
+      if (r == Refusal::truncated || r == Refusal::bad_length) detail = header_.total_bytes;
+      if (r != Refusal::none) return true;
+      check_crc_ = 0;
+      check_ = Check::checksum;
+      return false;
+    case Check::checksum: {
+      const std::uint32_t end = check_bytes_ - std::uint32_t{image::crc_bytes};
+      const std::uint32_t size = end - progress_ < checksum_bytes ? end - progress_ : checksum_bytes;
+      check_crc_ = crc32(image + progress_, size, check_crc_);
+      progress_ += size;
+      if (progress_ != end) return false;
+      r = check_crc_ != load_u32(image + end) ? Refusal::checksum
+                                              : check_binding(header_, nominal_hash_, robot_.name_hash);
+      if (r != Refusal::none) return true;
+      begin_model(robot_, model);
+      cursor_ = {};
+      check_ = Check::records;
       return false;
     }
-    if (change.is_beyond_right_angle || !(change.orientation_rad <= settings_.plausible_orientation_rad)) {
-      detail = micro(change.orientation_rad);
+    case Check::records:
+      for (unsigned n = 0; n < records_at_once && !at_end(cursor_, check_bytes_); ++n) {
+        if (load_u16(image + cursor_.at) == image::record_table) {
+          if (n != 0) break;
+          n = records_at_once;
+        }
+        r = add_record(image, check_bytes_, cursor_, model);
+        if (r == Refusal::unknown_basis) detail = unknown_basis(image, check_bytes_);
+        if (r == Refusal::too_many_terms) detail = FirmwareCapacity::terms;
+        if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
+        if (r != Refusal::none) return true;
+      }
+      if (at_end(cursor_, check_bytes_)) check_ = Check::finish;
       return false;
-    }
+    case Check::finish:
+      r = check_counts(header_, cursor_);
+      if (r != Refusal::none) return true;
+      finish_model(model);
+      // Before anything is evaluated: a probe pose takes a share of this.
+      detail = step_instructions(model);
+      if (detail > settings_.limits.instructions) {
+        r = Refusal::too_costly;
+        return true;
+      }
+      progress_ = 0;
+      check_ = Check::probes;
+      return false;
+    case Check::probes:
+      r = plausible(model, ++progress_, detail) ? Refusal::none : Refusal::implausible;
+      if (r != Refusal::none) return true;
+      if (progress_ != probe_poses) return false;
+      admission_.begin(model, settings_.limits, declared_ranges(settings_.ranges, robot_));
+      check_ = Check::bounds;
+      return false;
+    case Check::bounds:
+      for (unsigned n = 0; n < bounds_at_once; ++n) {
+        if (admission_.at_grid(model)) {
+          if (n != 0) return false;
+          n = bounds_at_once;
+        }
+        if (admission_.advance(model)) continue;
+        check_ = Check::verdict;
+        break;
+      }
+      return false;
+    case Check::verdict:
+      r = admission_.finish(model, certificates_[check_index_], detail);
+      return true;
   }
   return true;
+}
+
+/// True where the set moves the tool by no more than the plausible change at one of the probe poses, which are spread over
+/// the joint limits.
+bool Store::plausible(const FirmwareModel& model, std::uint32_t pose, std::uint32_t& detail) const {
+  FirmwareContext context = default_context<Scalar>(robot_);
+  Joints q;
+  for (std::size_t j = 0; j < joints; ++j) {
+    const Scalar low = from_binary64<Scalar>(robot_.limits[j].min_rad);
+    const Scalar high = from_binary64<Scalar>(robot_.limits[j].max_rad);
+    q[j] = low + (high - low) * spread(pose, j);
+    context.direction[j] = ((pose * 0x9E3779B9U) >> (8U + j)) & 1U ? Scalar(1) : Scalar(-1);
+    context.relative_speed[j] = context.direction[j];
+  }
+  const RemainingError<Scalar> change = remaining_error(model, q, q, context);
+  if (!(change.position_m <= settings_.plausible_position_m)) {
+    detail = micro(change.position_m);
+    return false;
+  }
+  if (change.is_beyond_right_angle || !(change.orientation_rad <= settings_.plausible_orientation_rad)) {
+    detail = micro(change.orientation_rad);
+    return false;
+  }
+  return true;
+}
+
+/// Ends a check in the background: what was verified is kept, committed or, of a rollback, made active.
+void Store::checked(Refusal r, std::uint32_t detail) {
+  if (purpose_ == Purpose::rollback) {
+    if (r != Refusal::none || !is_in_staging(incoming_)) {
+      previous_ = Set{};
+      finish(Answer::no_previous);
+      return;
+    }
+    job_ = Job::drop_active;
+    return;
+  }
+  if (r == Refusal::none && header_.sequence <= active_.sequence) {
+    r = Refusal::stale_sequence;
+    detail = active_.sequence;
+  }
+  if (r != Refusal::none) {
+    job_ = Job::none;
+    release();
+    refuse(r, detail);
+    return;
+  }
+  incoming_.index = check_index_;
+  incoming_.bytes = check_bytes_;
+  incoming_.sequence = header_.sequence;
+  incoming_.crc = load_u32(staging_.data() + check_bytes_ - 4);
+  touched_ = true;
+  if (purpose_ == Purpose::commit) {
+    begin_commit();
+    return;
+  }
+  job_ = Job::none;
+  state_ = StoreState::verified;
+  answer(Answer::accepted);
 }
 
 // --- staging ------------------------------------------------------------------------------------------
@@ -250,6 +366,7 @@ Answer Store::end(Origin origin) {
 }
 
 Answer Store::verify(Origin origin) {
+  if (is_verifying() && owns(origin)) return answer(Answer::accepted);
   if (state_ == StoreState::working) return answer(Answer::busy);
   if (state_ != StoreState::receiving && state_ != StoreState::verified) return answer(Answer::wrong_state);
   if (!owns(origin)) return answer(Answer::busy);
@@ -257,27 +374,18 @@ Answer Store::verify(Origin origin) {
   if (!length_known_ || staged_ != announced_) return answer(Answer::incomplete, staged_);
   std::uint32_t index = 0;
   if (!free_model(index)) return answer(Answer::busy);
-  ImageHeader header;
-  std::uint32_t detail = 0;
-  Refusal r = prepare(announced_, sets_.models[index], header, detail);
-  if (r == Refusal::none && header.sequence <= active_.sequence) {
-    r = Refusal::stale_sequence;
-    detail = active_.sequence;
-  }
-  if (r != Refusal::none) {
-    release();
-    return refuse(r, detail);
-  }
-  incoming_.index = index;
-  incoming_.bytes = announced_;
-  incoming_.sequence = header.sequence;
-  incoming_.crc = load_u32(staging_.data() + announced_ - 4);
-  state_ = StoreState::verified;
-  touched_ = true;
+  begin_check(announced_, index);
+  purpose_ = Purpose::verify;
+  job_ = Job::check;
+  state_ = StoreState::working;
   return answer(Answer::accepted);
 }
 
 Answer Store::drop(Origin origin) {
+  if (is_verifying() && owns(origin)) {
+    finish(Answer::accepted);
+    return Answer::accepted;
+  }
   if (state_ == StoreState::working ||
       (state_ != StoreState::idle && state_ != StoreState::trial && !owns(origin))) {
     return answer(Answer::busy);
@@ -288,34 +396,53 @@ Answer Store::drop(Origin origin) {
 }
 
 void Store::disconnect(Origin origin) {
-  if ((state_ == StoreState::receiving || state_ == StoreState::verified) && owns(origin)) release();
+  if (!owns(origin)) return;
+  if (state_ == StoreState::receiving || state_ == StoreState::verified || is_verifying()) {
+    job_ = Job::none;
+    release();
+  }
 }
 
 // --- commands that write non-volatile memory ----------------------------------------------------------
 
 Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
-  if (state_ == StoreState::receiving) {
+  // A client that asked for verify may ask for commit before that has ended: it then follows by itself.
+  const bool checking = is_verifying() && owns(origin);
+  const bool unverified = state_ == StoreState::receiving || checking;
+  if (checking) {
+    touched_ = true;
+  } else if (unverified) {
     const Answer a = verify(origin);
     if (a != Answer::accepted) return a;
+  } else {
+    if (state_ == StoreState::working) return answer(Answer::busy);
+    if (state_ != StoreState::verified) return answer(Answer::wrong_state);
+    if (!owns(origin)) return answer(Answer::busy);
   }
-  if (state_ == StoreState::working) return answer(Answer::busy);
-  if (state_ != StoreState::verified) return answer(Answer::wrong_state);
-  if (!owns(origin)) return answer(Answer::busy);
   if (storage_.read == nullptr || storage_.erase == nullptr || storage_.write == nullptr) {
-    release();
-    return answer(Answer::storage_failed);
+    finish(Answer::storage_failed);
+    return Answer::storage_failed;
   }
-  incoming_.slot = active_.slot == 0 ? 1 : 0;
   job_trial_ = trial;
   job_trial_cycles_ = cycles != 0 ? cycles : settings_.trial_cycles;
   if (job_trial_cycles_ == 0) job_trial_cycles_ = 1;
+  if (unverified) {
+    purpose_ = Purpose::commit;
+  } else {
+    begin_commit();
+  }
+  return answer(Answer::accepted);
+}
+
+/// Starts to write what was verified.
+void Store::begin_commit() {
+  incoming_.slot = active_.slot == 0 ? 1 : 0;
   state_ = StoreState::working;
   job_ = Job::erase;
   progress_ = 0;
   faults_ = static_cast<std::uint16_t>(faults_ & ~wire::fault::trial_reverted);
   // From here on the other slot holds nothing that a rollback could use.
   previous_ = Set{};
-  return answer(Answer::accepted);
 }
 
 Answer Store::confirm() {
@@ -346,12 +473,9 @@ Answer Store::rollback() {
   if (!free_model(index)) return answer(Answer::busy);
   incoming_ = previous_;
   incoming_.index = index;
-  if (!load(incoming_)) {
-    previous_ = Set{};
-    return answer(Answer::no_previous);
-  }
   state_ = StoreState::working;
-  job_ = Job::drop_active;
+  job_ = Job::load;
+  progress_ = 0;
   return answer(Answer::accepted);
 }
 
@@ -429,6 +553,29 @@ void Store::work() {
   switch (job_) {
     case Job::none:
       return;
+    case Job::load: {
+      const std::uint32_t left = incoming_.bytes - progress_;
+      const std::uint32_t size = left < chunk_bytes ? left : chunk_bytes;
+      if (storage_.read(storage_.user, incoming_.slot, progress_, staging_.data() + progress_, size) !=
+          StorageResult::done) {
+        faults_ |= wire::fault::storage;
+        previous_ = Set{};
+        finish(Answer::no_previous);
+        return;
+      }
+      progress_ += size;
+      if (progress_ != incoming_.bytes) return;
+      begin_check(incoming_.bytes, incoming_.index);
+      purpose_ = Purpose::rollback;
+      job_ = Job::check;
+      return;
+    }
+    case Job::check: {
+      Refusal verdict = Refusal::none;
+      std::uint32_t detail = 0;
+      if (check_slice(verdict, detail)) checked(verdict, detail);
+      return;
+    }
     case Job::erase:
       r = storage_.erase(storage_.user, incoming_.slot);
       if (r == StorageResult::done) job_ = Job::write;
@@ -571,11 +718,19 @@ bool Store::read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t si
   return true;
 }
 
+/// The model that answers: after a trial that ran out a moment ago, the one that the cycle already uses.
+std::uint32_t Store::used_model() const {
+  return sets_.handover.settled() ? sets_.handover.in_use() : active_.index;
+}
+
 const FirmwareModel* Store::active_model() const {
-  // A trial that ran out a moment ago: the cycle already uses the other one.
-  std::uint32_t index = active_.index;
-  if (sets_.handover.settled()) index = sets_.handover.in_use();
+  const std::uint32_t index = used_model();
   return index == Handover::none ? nullptr : &sets_.models[index];
+}
+
+const FirmwareCertificate* Store::active_certificate() const {
+  const std::uint32_t index = used_model();
+  return index == Handover::none ? nullptr : &certificates_[index];
 }
 
 void Store::status(wire::Status& out) const {

@@ -20,10 +20,12 @@ constexpr milliseconds polling_interval{10};
 /// Limit of the length that a controller may announce, bytes.
 constexpr std::size_t longest_image = std::size_t{1} << 24U;
 
-bool writes_memory(wire::Command command) {
-  return command == wire::Command::commit || command == wire::Command::commit_trial ||
-         command == wire::Command::confirm || command == wire::Command::rollback ||
-         command == wire::Command::restore_defaults;
+/// Commands that a controller accepts and then works on. A verify that it answers at once, as older ones do, is over by the
+/// first look at the status.
+bool takes_a_while(wire::Command command) {
+  return command == wire::Command::verify || command == wire::Command::commit ||
+         command == wire::Command::commit_trial || command == wire::Command::confirm ||
+         command == wire::Command::rollback || command == wire::Command::restore_defaults;
 }
 
 /// Tells from the active set whether a command took effect. The status has the answer to the last command of
@@ -33,6 +35,10 @@ bool took_effect(wire::Command command, const wire::Status& before, const wire::
   const bool other_set = now.active_slot != before.active_slot ||
                          now.active_sequence != before.active_sequence || now.active_crc != before.active_crc;
   switch (command) {
+    case wire::Command::verify:
+      // An answer that is another client's is noticed at the commit, which verifies anew where it has to.
+      return now.state == static_cast<std::uint16_t>(wire::StoreState::verified) ||
+             (now.answer == static_cast<std::uint16_t>(wire::Answer::accepted) && now.refusal == 0);
     case wire::Command::confirm:
       return now.state != trial && !other_set;
     case wire::Command::restore_defaults:
@@ -67,6 +73,13 @@ std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail)
     case Refusal::too_long:
       return fmt::format("{} (of {} bytes)", why, detail);
     case Refusal::stale_sequence:
+      return fmt::format("{} ({})", why, detail);
+    case Refusal::too_large:
+    case Refusal::too_steep:
+    case Refusal::too_compliant:
+    case Refusal::not_allowed_covariate:
+      return fmt::format("{} (number {} of those that are not constant)", why, detail + 1);
+    case Refusal::too_costly:
       return fmt::format("{} ({})", why, detail);
     case Refusal::implausible:
       return fmt::format("{} (by {:.3f} mm or mrad)", why, detail / 1000.0);
@@ -133,7 +146,7 @@ void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress
 
 void ControllerClient::run(wire::Command command, std::uint32_t argument) {
   const std::string what = describe(command);
-  const bool background = writes_memory(command);
+  const bool background = takes_a_while(command);
   const wire::Status before = background ? status() : wire::Status();
   retry_while_busy(what, [&] { send_command(command, argument); });
   if (!background) return;

@@ -19,6 +19,7 @@
 #include "files/data_file.hpp"
 #include "files/robot_file.hpp"
 #include "json.hpp"
+#include "model/admission.hpp"
 #include "report/results.hpp"
 
 namespace flexcomp::host {
@@ -96,6 +97,7 @@ void Diagnose::run() const {
   add_outlier_warning(warnings, data, rows, d.outliers);
   common.warn(warnings);
   stamp(d.after, robot_file);
+  refuse_inadmissible(d.after.terms, robot_file, out);
   save_calibration(out, d.after, robot_file);
   const bool planned = !plan.empty() && write_plan(d, robot_file);
 

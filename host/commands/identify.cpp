@@ -15,6 +15,7 @@
 #include "identification/identification_json.hpp"
 #include "json.hpp"
 #include "measurement/observation.hpp"
+#include "model/admission.hpp"
 #include "report/results.hpp"
 #include "units.hpp"
 
@@ -76,6 +77,7 @@ void Identify::run() const {
   const Identification r = identify(robot_file, rows, data, options);
   add_outlier_warning(warnings, data, rows, r.outliers);
   common.warn(warnings);
+  refuse_inadmissible(r.calibration.terms, robot_file, out);
   save_calibration(out, r.calibration, robot_file);
 
   for (const std::string& line : text_lines(r, robot_file, data, rows.size(), out)) common.say(line);

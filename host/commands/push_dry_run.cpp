@@ -11,6 +11,7 @@
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "json.hpp"
+#include "model/admission.hpp"
 #include "model/parameter_image.hpp"
 #include "model/set_difference.hpp"
 
@@ -64,16 +65,20 @@ void Push::show_changes() const {
     for_robot = load_robot(robot);
     ImageOptions options;
     options.allow_unnamed = allow_unnamed;
-    now = held_set(against, for_robot, options);
     next = held_set(set, for_robot, options);
+    options.allow_inadmissible = true;
+    now = held_set(against, for_robot, options);
     bus.say(fmt::format("{}: would take the place of {}. Nothing was sent.", set, against));
     result["against"] = against;
   }
+  const HostCertificate certificate = certified(next, for_robot, set);
   const SetDifference d = difference(now, next, for_robot, dry_run_poses);
   say_left_out(left_out);
   bus.say(difference_table(d));
+  bus.say(certificate_text(certificate));
   result["left_out"] = left_out;
   result.update(to_json(d));
+  result["certificate"] = to_json(certificate);
   bus.write_json(result);
 }
 

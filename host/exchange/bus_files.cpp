@@ -11,6 +11,7 @@
 
 #include "files/csv.hpp"
 #include "flexcomp/wire/canopen_dictionary.hpp"
+#include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/modbus_blocks.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "json.hpp"
@@ -189,6 +190,18 @@ std::vector<Field> fields_of(map::Block block) {
       // The robot's name is no part of the walk.
       walk.fields.push_back({"name_bytes", "u16", 2, ""});
       walk.fields.push_back({"name", "bytes", wire::robot_name_bytes, ""});
+      break;
+    }
+    case Block::certificate: {
+      wire::CertificateRecord record;
+      wire::detail::visit_certificate(record, walk);
+      add_each(names, "deflection", "rad");
+      add_each(names, "slope", "");
+      add(names,
+          "off_joint_deflection|rad, off_joint_slope, by_mass|rad/kg, by_force|rad/N, "
+          "by_centre_of_mass|rad/m, "
+          "by_temperature|rad/K, position|m, orientation|rad, reach|m, instructions, most_instructions, "
+          "sequence");
       break;
     }
     case Block::corrections:

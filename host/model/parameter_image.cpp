@@ -7,6 +7,7 @@
 
 #include "flexcomp/image.hpp"
 #include "input_error.hpp"
+#include "model/admission.hpp"
 #include "model/effects.hpp"
 #include "model/host_model.hpp"
 #include "model/place.hpp"
@@ -58,6 +59,7 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
     throw InputError(source, 0, "", "terms of the catalogue", e.what());
   }
   prepare(pushed, robot, source);
+  if (!options.allow_inadmissible) certified(pushed, robot, source);
   ImageHeader header;
   header.sequence = sequence;
   header.nominal_hash = nominal_hash(robot.nominal);

@@ -14,14 +14,15 @@
 namespace flexcomp::host {
 
 struct ImageOptions {
-  bool allow_unnamed = false;  ///< push what was found but not understood
+  bool allow_unnamed = false;       ///< push what was found but not understood
+  bool allow_inadmissible = false;  ///< to compare with: what an older controller may hold
 };
 
 /// The parameter image of a calibration, bound to the robot. Left out: effects of the measurement
 /// (belongs_to_measurement()), and the base where frames were fitted. Instances and tables are numbered in order of
 /// appearance, so that image -> calibration file -> image is the identity on bytes.
 /// \throws InputError  unnamed effects (unless allowed), base or tool terms above 20 mm or 2 degrees, terms that the
-///                     core refuses
+///                     core refuses, a set beyond the limits of admission
 std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot& robot,
                                      std::uint32_t sequence, const ImageOptions& options = {});
 

@@ -161,6 +161,13 @@ inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHea
   return Refusal::none;
 }
 
+/// Whether an image is for this robot.
+inline Refusal check_binding(const ImageHeader& header, const Sha256Digest& nominal,
+                             const Sha256Digest& name) {
+  if (header.name_hash != name) return Refusal::wrong_robot;
+  return header.nominal_hash != nominal ? Refusal::wrong_nominal : Refusal::none;
+}
+
 /// Checks header, CRC-32 and binding to a robot, without reading the records. Work: ten instructions per
 /// byte.
 inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sha256Digest& nominal,
@@ -169,9 +176,7 @@ inline Refusal check_image(const std::uint8_t* bytes, std::size_t size, const Sh
   if (r != Refusal::none) return r;
   if (crc32(bytes, size - image::crc_bytes) != load_u32(bytes + size - image::crc_bytes))
     return Refusal::checksum;
-  if (header.name_hash != name) return Refusal::wrong_robot;
-  if (header.nominal_hash != nominal) return Refusal::wrong_nominal;
-  return Refusal::none;
+  return check_binding(header, nominal, name);
 }
 
 namespace detail {
@@ -179,104 +184,130 @@ namespace detail {
 /// The distal joint (from 0) that a term's argument names; 0 where it names none.
 template <class S>
 inline std::uint8_t distal_joint_of(S argument) {
-  std::uint8_t joint = 0xFF;
-  while (joint != 0 && !(S(joint) == argument)) --joint;
-  return joint;
+  if (!(argument > S(0)) || !(argument < S(256))) return 0;
+  const auto joint = static_cast<std::uint8_t>(argument);
+  return S(joint) < argument ? std::uint8_t{0} : joint;
 }
 
 }  // namespace detail
 
-/// Passes each record of a checked image to a visitor: `Refusal table(const Table&, const std::uint8_t*
-/// values)` and `Refusal term(const Term<S>&)`. Ends at the first refusal. Work is linear in the size of the
-/// image.
+/// Where the reading of an image's records stands.
+struct ImageCursor {
+  std::size_t at = image::header_bytes;  ///< of the next record
+  std::size_t terms = 0;                 ///< so far
+  std::size_t tables = 0;                ///< so far
+  std::size_t values = 0;                ///< of all tables so far
+};
+
+/// True where all records of an image of `size` bytes have been read.
+constexpr bool at_end(const ImageCursor& cursor, std::size_t size) {
+  return cursor.at + image::crc_bytes >= size;
+}
+
+/// Passes the record at the cursor, which is not at the end, to a visitor: `Refusal table(const Table&, const std::uint8_t*
+/// values)` or `Refusal term(const Term<S>&)`.
+template <class S, class Visitor>
+inline Refusal visit_record(const std::uint8_t* bytes, std::size_t size, ImageCursor& cursor,
+                            Visitor&& visitor) {
+  const std::uint8_t* p = bytes + cursor.at;
+  const std::size_t left = size - image::crc_bytes - cursor.at;
+  if (left < image::record_head_bytes) return Refusal::bad_length;
+  const std::uint16_t type = load_u16(p);
+  const std::size_t length = load_u16(p + 2);
+  if (length % 4 != 0 || length > left - image::record_head_bytes) return Refusal::bad_length;
+  const std::uint8_t* body = p + image::record_head_bytes;
+  cursor.at += image::record_head_bytes + length;
+  if (type == image::record_term) {
+    if (length != image::term_bytes) return Refusal::bad_length;
+    Term<S> t;
+    t.place = {body[0], body[1]};
+    t.basis = static_cast<Basis>(body[2]);
+    t.joint = body[3];
+    t.factor = static_cast<Factor>(body[4]);
+    t.effect = static_cast<Effect>(body[5]);
+    t.instance = load_u16(body + 6);
+    t.table = load_u16(body + 8);
+    t.argument = load_scalar<S>(body + 12);
+    t.coefficient = load_scalar<S>(body + 20);
+    if (!is_finite(t.argument) || !is_finite(t.coefficient)) return Refusal::bad_value;
+    if (t.basis == Basis::link_weight) {
+      t.distal_joint = detail::distal_joint_of(t.argument);
+      t.argument = S(0);
+    }
+    ++cursor.terms;
+    return visitor.term(t);
+  }
+  if (type == image::record_table) {
+    if (length < image::table_head_bytes || (length - image::table_head_bytes) % 8 != 0)
+      return Refusal::bad_length;
+    Table t;
+    t.size = static_cast<std::uint16_t>((length - image::table_head_bytes) / 8);
+    t.offset = static_cast<std::uint16_t>(cursor.values);
+    t.rows = load_u16(body);
+    t.columns = load_u16(body + 2);
+    t.row_covariate = static_cast<Covariate>(body[4]);
+    t.row_joint = body[5];
+    t.column_covariate = static_cast<Covariate>(body[6]);
+    t.column_joint = body[7];
+    for (std::size_t k = 0; k < t.size; ++k) {
+      if (!is_finite(load_scalar<S>(body + image::table_head_bytes + 8 * k))) return Refusal::bad_value;
+    }
+    cursor.values += t.size;
+    ++cursor.tables;
+    return visitor.table(t, body + image::table_head_bytes);
+  }
+  return (type & image::optional_record) == 0 ? Refusal::unknown_record : Refusal::none;
+}
+
+/// Whether the records that were read are as many as the header says.
+inline Refusal check_counts(const ImageHeader& header, const ImageCursor& cursor) {
+  return cursor.terms == header.terms && cursor.tables == header.tables && cursor.values == header.values
+             ? Refusal::none
+             : Refusal::bad_length;
+}
+
+/// Passes each record of a checked image to a visitor, as visit_record() does; ends at the first refusal. Work is linear in
+/// the size of the image.
 template <class S, class Visitor>
 inline Refusal visit_image(const std::uint8_t* bytes, std::size_t size, Visitor&& visitor) {
   ImageHeader header;
   const Refusal head = read_header(bytes, size, header);
   if (head != Refusal::none) return head;
-  const std::uint8_t* p = bytes + image::header_bytes;
-  std::size_t left = size - image::header_bytes - image::crc_bytes;
-  std::size_t terms = 0;
-  std::size_t tables = 0;
-  std::size_t offset = 0;
-  while (left != 0) {
-    if (left < image::record_head_bytes) return Refusal::bad_length;
-    const std::uint16_t type = load_u16(p);
-    const std::size_t length = load_u16(p + 2);
-    if (length % 4 != 0 || length > left - image::record_head_bytes) return Refusal::bad_length;
-    const std::uint8_t* body = p + image::record_head_bytes;
-    Refusal r = Refusal::none;
-    if (type == image::record_term) {
-      if (length != image::term_bytes) return Refusal::bad_length;
-      Term<S> t;
-      t.place = {body[0], body[1]};
-      t.basis = static_cast<Basis>(body[2]);
-      t.joint = body[3];
-      t.factor = static_cast<Factor>(body[4]);
-      t.effect = static_cast<Effect>(body[5]);
-      t.instance = load_u16(body + 6);
-      t.table = load_u16(body + 8);
-      t.argument = load_scalar<S>(body + 12);
-      t.coefficient = load_scalar<S>(body + 20);
-      if (!is_finite(t.argument) || !is_finite(t.coefficient)) return Refusal::bad_value;
-      if (t.basis == Basis::link_weight) {
-        t.distal_joint = detail::distal_joint_of(t.argument);
-        t.argument = S(0);
-      }
-      ++terms;
-      r = visitor.term(t);
-    } else if (type == image::record_table) {
-      if (length < image::table_head_bytes || (length - image::table_head_bytes) % 8 != 0)
-        return Refusal::bad_length;
-      Table t;
-      t.size = static_cast<std::uint16_t>((length - image::table_head_bytes) / 8);
-      t.offset = static_cast<std::uint16_t>(offset);
-      t.rows = load_u16(body);
-      t.columns = load_u16(body + 2);
-      t.row_covariate = static_cast<Covariate>(body[4]);
-      t.row_joint = body[5];
-      t.column_covariate = static_cast<Covariate>(body[6]);
-      t.column_joint = body[7];
-      for (std::size_t k = 0; k < t.size; ++k) {
-        if (!is_finite(load_scalar<S>(body + image::table_head_bytes + 8 * k))) return Refusal::bad_value;
-      }
-      offset += t.size;
-      ++tables;
-      r = visitor.table(t, body + image::table_head_bytes);
-    } else if ((type & image::optional_record) == 0) {
-      return Refusal::unknown_record;
-    }
+  ImageCursor cursor;
+  while (!at_end(cursor, size)) {
+    const Refusal r = visit_record<S>(bytes, size, cursor, visitor);
     if (r != Refusal::none) return r;
-    p += image::record_head_bytes + length;
-    left -= image::record_head_bytes + length;
   }
-  if (terms != header.terms || tables != header.tables || offset != header.values) return Refusal::bad_length;
-  return Refusal::none;
+  return check_counts(header, cursor);
 }
 
+/// Adds what an image holds to a model, as visit_record() finds it. Effects of the measurement (place `point`, base drift,
+/// readout lag, reflector slip) are refused: they are never pushed.
+template <class S, std::size_t N, class Cap>
+struct ModelBuilder {
+  Model<S, N, Cap>& model;  ///< after begin()
+  /// Copies a table.
+  Refusal table(const Table& t, const std::uint8_t* values) {
+    return model.add_table_from([values](std::size_t k) { return load_scalar<S>(values + 8 * k); }, t);
+  }
+  /// Adds a term.
+  Refusal term(const Term<S>& t) {
+    // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that
+    // follows it would move the arm without a bound on the change per cycle.
+    if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
+        t.basis == Basis::relative_speed || belongs_to_measurement(t.effect)) {
+      return Refusal::bad_place;
+    }
+    return model.add(t);
+  }
+};
+
 /// Prepares a model from an image that check_image() accepted. On a refusal the model must not be used.
-/// Effects of the measurement (place `point`, base drift, readout lag, reflector slip) are refused: they are
-/// never pushed.
 template <class S, std::size_t N, class Cap>
 inline Refusal model_from_image(const std::uint8_t* bytes, std::size_t size, const NominalRobot<N>& robot,
                                 Model<S, N, Cap>& model) {
-  struct Builder {
-    Model<S, N, Cap>& model;
-    Refusal table(const Table& t, const std::uint8_t* values) {
-      return model.add_table_from([values](std::size_t k) { return load_scalar<S>(values + 8 * k); }, t);
-    }
-    Refusal term(const Term<S>& t) {
-      // By the basis, not only by the effect: the controller's clock is not the tracker's, and a term that
-      // follows it would move the arm without a bound on the change per cycle.
-      if (t.place.body == body::point || t.basis == Basis::time || t.basis == Basis::step ||
-          t.basis == Basis::relative_speed || belongs_to_measurement(t.effect)) {
-        return Refusal::bad_place;
-      }
-      return model.add(t);
-    }
-  };
   model.begin(robot);
-  const Refusal r = visit_image<S>(bytes, size, Builder{model});
+  const Refusal r = visit_image<S>(bytes, size, ModelBuilder<S, N, Cap>{model});
   if (r == Refusal::none) model.finish();
   return r;
 }

@@ -40,8 +40,9 @@ using DefaultCapacity = Capacity<64, 8, 768>;
 template <class S, std::size_t N = 6, class Cap = DefaultCapacity>
 class Model {
  public:
-  using Scalar = S;                         ///< of all numbers
-  static constexpr std::size_t joints = N;  ///< revolute
+  using Scalar = S;                                        ///< of all numbers
+  static constexpr std::size_t joints = N;                 ///< revolute
+  static constexpr std::size_t most_tables = Cap::tables;  ///< that it holds
 
   /// Resets to the nominal robot without terms.
   void begin(const NominalRobot<N>& robot) {
@@ -195,7 +196,7 @@ class Model {
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     plan_.set(*this);
-    tool_motion_ = detail::provisional_tool_motion(*this);
+    tool_motion_ = detail::tool_motion_of(*this);
   }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
@@ -218,10 +219,12 @@ class Model {
   const LinkShape<S>& nominal(std::size_t i) const { return nominal_[i]; }  ///< link i (from 0) without terms
   const LinkShape<S>& shape(std::size_t i) const { return shape_[i]; }  ///< link i with its constant terms
   const Pose<S>& nominal_tool() const { return nominal_tool_; }         ///< Ftool in F6 without terms
-  const Pose<S>& tool_pose() const { return tool_pose_; }             ///< Ftool in F6 with its constant terms
-  const Pose<S>& base_pose() const { return base_pose_; }             ///< B with its constant terms
-  const std::array<S, 6>& base() const { return base_; }              ///< constant part, m and rad
-  const std::array<S, 6>& tool() const { return tool_; }              ///< constant part, m and rad
+  const Pose<S>& tool_pose() const { return tool_pose_; }  ///< Ftool in F6 with its constant terms
+  const Pose<S>& base_pose() const { return base_pose_; }  ///< B with its constant terms
+  const std::array<S, 6>& base() const { return base_; }   ///< constant part, m and rad
+  const std::array<S, 6>& tool() const { return tool_; }   ///< constant part, m and rad
+  /// Constant parts of the slots of link i (from 0), m and rad.
+  const std::array<S, 6>& constant(std::size_t i) const { return constant_[i]; }
   S lower(std::size_t i) const { return lower_[i]; }                  ///< joint limit, rad
   S upper(std::size_t i) const { return upper_[i]; }                  ///< joint limit, rad
   const Vector3<S>& gravity() const { return gravity_; }              ///< m/s^2, in F0

@@ -5,6 +5,7 @@
 #ifndef FLEXCOMP_SINGULAR_REGION_HPP
 #define FLEXCOMP_SINGULAR_REGION_HPP
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -62,10 +63,11 @@ inline SingularRegion<S> singular_region(const ToolMotion<S>& motion,
 
 namespace detail {
 
-/// ToolMotion: the sum of what the constant terms, compliances, link weights and curves of a model do at their
-/// worst. Other terms are not in it. Provisional: the certificate of a set will give it.
+/// ToolMotion: the sum of what constant terms, compliances at the robot's own payload, link weights, waves and curves of a
+/// model do at their worst. Not the certificate's size, which is at ranges that a controller declares: these thresholds are
+/// the same on every host and controller. Work linear in terms and table values.
 template <class M>
-inline ToolMotion<typename M::Scalar> provisional_tool_motion(const M& model) {
+inline ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
   using S = typename M::Scalar;
   using std::sqrt;
   constexpr std::size_t n = M::joints;
@@ -74,6 +76,23 @@ inline ToolMotion<typename M::Scalar> provisional_tool_motion(const M& model) {
   const auto& robot = model.robot();
   const auto& gravity = model.gravity();
   const S weight = abs(S(robot.payload_kg)) * length(gravity[0], gravity[1], gravity[2]);
+  std::array<S, M::most_tables> greatest{};
+  for (std::size_t k = 0; k < model.table_count(); ++k) {
+    const Table& table = model.table(k);
+    const S* values = model.values(table);
+    for (std::size_t v = 0; v < table.size; ++v) {
+      if (abs(values[v]) > greatest[k]) greatest[k] = abs(values[v]);
+    }
+  }
+  std::array<S, n> turn_of{};
+  for (std::size_t k = 0; k < model.effect_count(); ++k) {
+    const auto& t = model.effect(k);
+    if (t.place.body < 1 || t.place.body > n || t.place.slot != slot::theta) continue;
+    S& turn = turn_of[t.place.body - 1U];
+    if (t.basis == Basis::link_weight || t.basis == Basis::sine || t.basis == Basis::cosine)
+      turn += abs(t.coefficient);
+    if (t.basis == Basis::curve && t.factor == Factor::one) turn += abs(t.coefficient) * greatest[t.table];
+  }
   const auto& tool = model.nominal_tool().position;
   S reach = length(tool[0], tool[1], tool[2]);
   S arm = length(S(robot.payload_com_m[0]), S(robot.payload_com_m[1]), S(robot.payload_com_m[2]));
@@ -86,20 +105,7 @@ inline ToolMotion<typename M::Scalar> provisional_tool_motion(const M& model) {
     const S link = length(model.nominal(i).a, i == 0 ? S(0) : model.nominal(i).d, S(0));
     reach += link;
     arm += link;
-    turn = abs(model.plan().compliance(i)) * weight * arm;
-    for (std::size_t k = 0; k < model.effect_count(); ++k) {
-      const auto& t = model.effect(k);
-      if (t.place.body != i + 1 || t.place.slot != slot::theta) continue;
-      if (t.basis == Basis::link_weight || t.basis == Basis::sine || t.basis == Basis::cosine)
-        turn += abs(t.coefficient);
-      if (t.basis == Basis::curve && t.factor == Factor::one) {
-        const Table& table = model.table(t.table);
-        S most = S(0);
-        for (std::size_t v = 0; v < table.size; ++v)
-          if (abs(model.values(table)[v]) > most) most = abs(model.values(table)[v]);
-        turn += abs(t.coefficient) * most;
-      }
-    }
+    turn = turn_of[i] + abs(model.plan().compliance(i)) * weight * arm;
     motion.position_m += turn * reach;
     motion.orientation_rad += turn;
   }

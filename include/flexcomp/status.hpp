@@ -29,6 +29,12 @@ enum class Refusal : std::uint8_t {
   mounting = 15,         ///< link_gravity where gravity is not along the axis of joint 1
   too_long = 16,         ///< longer than the staging memory
   stale_sequence = 17,   ///< a sequence number not above the active one
+  // Admission (admission.hpp); the detail is the index of the term among those that are not constant.
+  too_large = 18,              ///< a value, a reversal or a growth per kelvin beyond what an arm has
+  too_steep = 19,              ///< changes faster with a reading than an arm does
+  too_compliant = 20,          ///< gives way to load or force by more than an arm does
+  not_allowed_covariate = 21,  ///< follows time or speed
+  too_costly = 22,             ///< a step would take too many instructions; the detail is their number
 };
 
 /// Result of one joint command (docs/compensation.md, C17). Numbers are on the wire: add, never change.
@@ -134,6 +140,16 @@ inline const char* text(Refusal r) {
       return "the image is longer than the staging memory";
     case Refusal::stale_sequence:
       return "the image's sequence is not above the active one";
+    case Refusal::too_large:
+      return "the image has a term that is larger than on any arm";
+    case Refusal::too_steep:
+      return "the image has a term that changes faster with a joint's reading than on any arm";
+    case Refusal::too_compliant:
+      return "the image has a term that gives way to loads more than any arm";
+    case Refusal::not_allowed_covariate:
+      return "the image has a term that follows time or speed";
+    case Refusal::too_costly:
+      return "the image takes more instructions in a control cycle than are allowed";
   }
   return "unknown refusal";
 }

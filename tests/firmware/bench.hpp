@@ -185,11 +185,28 @@ class Arm {
 
   /// Background and cycle, until the work has ended.
   wire::Status settle() {
-    for (int k = 0; k < 200; ++k) {
+    until_done();
+    for (int k = 0; k < 20; ++k) {
       device->store().poll(now_ms += 1);
       step();
     }
     return device->status();
+  }
+
+  /// Background and cycle, until the store is no longer working.
+  wire::Status until_done() {
+    for (int k = 0; k < 5000; ++k) {
+      if (device->status().state != static_cast<std::uint16_t>(wire::StoreState::working)) break;
+      device->store().poll(now_ms += 1);
+      step();
+    }
+    return device->status();
+  }
+
+  /// verify, and what became of it.
+  wire::Answer verify(Origin origin = 1) {
+    const wire::Answer a = run(wire::Command::verify, 0, origin);
+    return a == wire::Answer::accepted ? static_cast<wire::Answer>(until_done().answer) : a;
   }
 
   wire::Answer run(wire::Command c, std::uint32_t argument = 0, Origin origin = 1) {
@@ -204,7 +221,7 @@ class Arm {
 
   /// What became of a set: the refusal, or none.
   Refusal offer(const Bytes& image) {
-    if (stage(image) == wire::Answer::accepted) run(wire::Command::verify);
+    if (stage(image) == wire::Answer::accepted) verify();
     const wire::Status s = device->status();
     return static_cast<Refusal>(s.refusal);
   }

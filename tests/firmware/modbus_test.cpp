@@ -91,6 +91,20 @@ class ModbusPdu : public testing::Test {
   Client client{*arm.device, 1};
 };
 
+TEST_F(ModbusPdu, TellsTheCertificateOfTheActiveSet) {
+  ASSERT_EQ(arm.push(make_image(arm.robot, 4)), wire::Answer::accepted);
+  for (const std::uint8_t f : {std::uint8_t{3}, std::uint8_t{4}}) {
+    const Bytes r = client.read(map::certificate, map::certificate_registers, f);
+    ASSERT_EQ(r.size(), 2 + wire::certificate_bytes);
+    wire::CertificateRecord record;
+    wire::decode(r.data() + 2, wire::ByteOrder::big, record);
+    EXPECT_EQ(record.sequence, 4U);
+    EXPECT_EQ(record.position_m, arm.device->certificate().position_m);
+    EXPECT_EQ(record.instructions, arm.device->certificate().instructions);
+  }
+  EXPECT_EQ(client.ask(join({{6}, be({map::certificate, 1})})), exception(6, 2)) << "read only";
+}
+
 TEST_F(ModbusPdu, ChecksQuantityThenAddressThenByteCount) {
   for (const std::uint8_t f : {std::uint8_t{3}, std::uint8_t{4}}) {
     EXPECT_EQ(client.read(0, 0, f), exception(f, 3));
@@ -153,6 +167,8 @@ TEST_F(ModbusPdu, PushPullAndProbe) {
   const Bytes image = make_image(arm.robot, 5);
   ASSERT_EQ(client.stage(image)[0], 0x10);
   EXPECT_EQ(client.run(wire::Command::verify)[0], 0x10);
+  EXPECT_EQ(client.status().state, static_cast<std::uint16_t>(wire::StoreState::working));
+  arm.until_done();
   EXPECT_EQ(client.status().state, static_cast<std::uint16_t>(wire::StoreState::verified));
   EXPECT_EQ(client.run(wire::Command::commit)[0], 0x10);
   arm.settle();
@@ -191,7 +207,8 @@ TEST_F(ModbusPdu, RefusesWithTheReasonInTheStatus) {
   Bytes image = make_image(arm.robot, 1);
   image[200] ^= 1U;
   client.stage(image);
-  EXPECT_EQ(client.run(wire::Command::commit), exception(0x10, 4));
+  EXPECT_EQ(client.run(wire::Command::commit)[0], 0x10);
+  arm.until_done();
   EXPECT_EQ(client.status().answer, static_cast<std::uint16_t>(wire::Answer::refused));
   EXPECT_EQ(client.status().refusal, static_cast<std::uint16_t>(Refusal::checksum));
   client.stage(make_image(arm.robot, 1));
@@ -206,7 +223,9 @@ TEST_F(ModbusPdu, RefusesWithTheReasonInTheStatus) {
   EXPECT_EQ(other.write(map::staging_offset, join({be({0, 0}), odd}))[0], 0x10) << "an odd length is padded";
   EXPECT_EQ(other.status().staged_bytes, 101U);
   EXPECT_EQ(other.write(map::staging_offset, join({be({0, 0}), odd, be({0})})), exception(0x10, 4));
-  EXPECT_EQ(other.run(wire::Command::verify), exception(0x10, 4));
+  EXPECT_EQ(other.run(wire::Command::verify)[0], 0x10);
+  arm.until_done();
+  EXPECT_EQ(other.status().answer, static_cast<std::uint16_t>(wire::Answer::refused));
   EXPECT_EQ(other.read(map::reading_window, 1), exception(3, 2)) << "no active image";
 }
 

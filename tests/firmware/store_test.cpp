@@ -157,6 +157,110 @@ TEST(Store, HasRoomForWhatItPromises) {
   EXPECT_EQ(offered(), Refusal::too_many_terms);
 }
 
+/// The image of one term with a table of its own.
+Bytes image_of_one(const Robot& robot, const Term<Scalar>& term, const Table& table = {},
+                   const std::vector<Scalar>& values = {}) {
+  return image_of(robot, 1, {&term, 1, &table, values.empty() ? 0U : 1U, values.data(), values.size()});
+}
+
+// What no arm can mean, and what the probe poses do not show.
+TEST(Store, RefusesByItsBoundsWhatNoArmCanMean) {
+  Robot robot = tx60l();
+  robot.payload_kg = 0;
+  Arm arm({}, robot);
+  Term<Scalar> t;
+  t.place = {6, slot::theta};
+  t.joint = 5;
+  const auto offered = [&](const Table& table = {}, const std::vector<Scalar>& values = {}) {
+    return arm.offer(image_of_one(robot, t, table, values));
+  };
+  t.basis = Basis::load_torque;
+  t.coefficient = real(1);
+  EXPECT_EQ(offered(), Refusal::too_compliant);
+  EXPECT_EQ(arm.device->status().detail, 0U);
+  t.basis = Basis::sine;
+  t.coefficient = real(0.02);
+  for (const double order : {100.0, 300.0, 5000.0}) {
+    t.argument = real(order);
+    EXPECT_EQ(offered(), Refusal::too_steep) << order;
+  }
+  t.basis = Basis::curve;
+  t.coefficient = real(1);
+  t.table = 0;
+  Table spike;
+  spike.size = 256;
+  std::vector<Scalar> values(256);
+  values[77] = real(0.03);
+  EXPECT_EQ(offered(spike, values), Refusal::too_large);
+  t.basis = Basis::grid;
+  Table grid;
+  grid.rows = grid.columns = 2;
+  grid.size = 8;
+  for (const Covariate c : {Covariate::time, Covariate::relative_speed}) {
+    grid.column_covariate = c;
+    EXPECT_EQ(offered(grid, {real(-1), real(1), real(0), real(1), 0, real(1e-3), 0, real(1e-3)}),
+              Refusal::not_allowed_covariate);
+  }
+  t = {};
+  t.place = {4, slot::d};
+  t.basis = Basis::thermal;
+  t.coefficient = real(0.02);
+  EXPECT_EQ(offered(), Refusal::too_large);
+}
+
+TEST(Store, NamesTheTermThatABoundIsExceededBy) {
+  Arm arm;
+  std::vector<Term<Scalar>> terms = some_terms(1, 1);
+  terms.pop_back();  // the curve
+  std::uint32_t effects = 0;
+  for (const Term<Scalar>& t : terms) effects += is_constant(t) ? 0U : 1U;
+  Term<Scalar> steep;
+  steep.place = {1, slot::theta};
+  steep.basis = Basis::sine;
+  steep.argument = real(80);
+  steep.coefficient = real(4e-3);
+  terms.insert(terms.begin(), steep);
+  EXPECT_EQ(arm.offer(image_of(arm.robot, 1, {terms.data(), terms.size(), nullptr, 0, nullptr, 0})),
+            Refusal::too_steep);
+  EXPECT_EQ(arm.device->status().detail, 0U);
+  terms.erase(terms.begin());
+  terms.push_back(steep);
+  EXPECT_EQ(arm.offer(image_of(arm.robot, 1, {terms.data(), terms.size(), nullptr, 0, nullptr, 0})),
+            Refusal::too_steep);
+  EXPECT_EQ(arm.device->status().detail, effects);
+}
+
+TEST(Store, RefusesWhatAStepHasNoTimeFor) {
+  DeviceSettings settings;
+  settings.store.limits.instructions = 12000;
+  Arm arm(settings);
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 1)), Refusal::too_costly);
+  EXPECT_GT(arm.device->status().detail, 12000U);
+}
+
+TEST(Store, TellsTheBoundsOfTheActiveSetOnly) {
+  Arm arm;
+  EXPECT_EQ(arm.device->certificate().sequence, 0U);
+  EXPECT_EQ(arm.device->certificate().instructions, 0U);
+  EXPECT_EQ(arm.device->certificate().most_instructions, 60000U);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  const wire::CertificateRecord one = arm.device->certificate();
+  EXPECT_EQ(one.sequence, 1U);
+  EXPECT_GT(one.instructions, 10000U);
+  EXPECT_GT(double_of(one.position_m), 1e-4);
+  arm.stage(make_image(arm.robot, 2, 2));
+  ASSERT_EQ(arm.verify(), Answer::accepted);
+  EXPECT_EQ(arm.device->certificate().position_m, one.position_m) << "what is staged is not what runs";
+  arm.run(Command::commit);
+  arm.settle();
+  EXPECT_GT(double_of(arm.device->certificate().position_m), 1.5 * double_of(one.position_m));
+  ASSERT_EQ(arm.run(Command::rollback), Answer::accepted);
+  arm.settle();
+  EXPECT_EQ(arm.device->certificate().position_m, one.position_m);
+  Arm after(arm.flash);
+  EXPECT_EQ(after.device->certificate().position_m, one.position_m);
+}
+
 TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
   Arm arm;
   const Bytes first = make_image(arm.robot, 1);
@@ -178,7 +282,7 @@ TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
   EXPECT_EQ(state(arm), StoreState::idle);
 
   arm.stage(second);
-  arm.run(Command::verify);
+  ASSERT_EQ(arm.verify(), Answer::accepted);
   store.poll(arm.now_ms);
   store.poll(arm.now_ms + 30000);  // left alone too long
   EXPECT_EQ(state(arm), StoreState::idle);
@@ -186,6 +290,82 @@ TEST(Store, ATransferThatEndsHalfwayChangesNothing) {
 
   EXPECT_EQ(arm.flash.slots, before);
   EXPECT_EQ(arm.pull(), first);
+}
+
+TEST(Store, ChecksInSlicesAndSaysWorkingMeanwhile) {
+  Arm arm;
+  arm.stage(make_image(arm.robot, 1));
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  unsigned polls = 0;
+  for (; state(arm) == StoreState::working && polls < 1000; ++polls) {
+    EXPECT_EQ(arm.device->status().answer, static_cast<std::uint16_t>(Answer::accepted));
+    EXPECT_EQ(arm.run(Command::verify), Answer::accepted) << "the same client asks again";
+    EXPECT_EQ(arm.run(Command::verify, 0, 2), Answer::busy);
+    EXPECT_EQ(arm.run(Command::begin, 100), Answer::busy);
+    arm.run(Command::verify);
+    arm.device->store().poll(++arm.now_ms);
+  }
+  EXPECT_EQ(state(arm), StoreState::verified);
+  EXPECT_GT(polls, 36U) << "32 probe poses, and the rest";
+  EXPECT_EQ(arm.run(Command::abort), Answer::accepted);
+}
+
+TEST(Store, ACommitDuringACheckFollowsByItself) {
+  Arm arm;
+  const Bytes image = make_image(arm.robot, 1);
+  arm.stage(image);
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  arm.device->store().poll(++arm.now_ms);
+  EXPECT_EQ(arm.run(Command::commit, 0, 2), Answer::busy);
+  EXPECT_EQ(arm.run(Command::commit), Answer::accepted);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::accepted);
+  EXPECT_EQ(arm.pull(), image);
+  // And of what is refused nothing is written.
+  const unsigned erased = arm.flash.erased_slots;
+  Bytes bad = make_image(arm.robot, 2);
+  bad[120] ^= 1U;
+  arm.stage(bad);
+  EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+  EXPECT_EQ(arm.run(Command::commit), Answer::accepted);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::refused);
+  EXPECT_EQ(state(arm), StoreState::idle);
+  EXPECT_EQ(arm.flash.erased_slots, erased);
+  EXPECT_EQ(arm.sequence(), 1U);
+}
+
+TEST(Store, ACheckIsGivenUpByItsClient) {
+  Arm arm;
+  for (const bool by_command : {true, false}) {
+    arm.stage(make_image(arm.robot, 1));
+    EXPECT_EQ(arm.run(Command::verify), Answer::accepted);
+    arm.device->store().poll(++arm.now_ms);
+    EXPECT_EQ(arm.run(Command::abort, 0, 2), Answer::busy);
+    if (by_command) {
+      EXPECT_EQ(arm.run(Command::abort), Answer::accepted);
+    } else {
+      arm.device->store().disconnect(2);
+      EXPECT_EQ(state(arm), StoreState::working);
+      arm.device->store().disconnect(1);
+    }
+    EXPECT_EQ(state(arm), StoreState::idle);
+    arm.settle();
+    EXPECT_EQ(arm.run(Command::commit), Answer::wrong_state);
+  }
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 1)), Refusal::none);
+}
+
+TEST(Store, ARollbackChecksBeforeItErases) {
+  Arm arm;
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 2, 1, 2)), Answer::accepted);
+  for (auto& slot : arm.flash.slots) {
+    if (load_u32(slot.data() + 12) == 1) slot[200] ^= 1U;  // damaged since
+  }
+  EXPECT_EQ(arm.run(Command::rollback), Answer::accepted);
+  EXPECT_EQ(state(arm), StoreState::working);
+  EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::no_previous);
+  EXPECT_EQ(arm.sequence(), 2U);
+  EXPECT_EQ(arm.pull(), make_image(arm.robot, 2, 1, 2));
 }
 
 TEST(Store, OneClientAtATime) {

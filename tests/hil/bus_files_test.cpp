@@ -218,6 +218,7 @@ TEST(RegisterMap, HasWhatTheServerHasAndNothingElse) {
   EXPECT_EQ(value("capability.largest_correction"), can.largest_correction_rad);
   EXPECT_EQ(value("status.last_status"), arm.device->status().last_status);
   EXPECT_EQ(value("status.active_slot"), arm.device->status().active_slot);
+  EXPECT_EQ(value("certificate.most_instructions"), arm.device->certificate().most_instructions);
   const Robot robot = tx60l();
   EXPECT_EQ(value("robot.link3_a"), bits_of(static_cast<double>(robot.links[2].a_m)));
   EXPECT_EQ(value("robot.joint6_max"), bits_of(static_cast<double>(robot.limits[5].max_rad)));

@@ -117,6 +117,9 @@ try:
     if [p["name"] for p in told["parameters"]] != ["link2.a_mm"]: fail(told)
     one = told["parameters"][0]
     if abs(one["old"] - wanted) > 1e-9 or abs(one["new"] - wanted - 0.25) > 1e-9 or abs(told["tool"]["largest_mm"] - 0.25) > 0.002: fail(told)
+    bounds = told["certificate"]
+    if not 10000 < bounds["instructions"] < 60000 or len(bounds["deflection_deg"]) != 6 or not 0.5 < bounds["position_mm"] < 100: fail(bounds)
+    if "cost: at most %d instructions" % bounds["instructions"] not in said or "bounds: joints deflect by at most" not in said: fail(said)
     if "holds set 1" not in said or not re.search(r"link2\.a_mm .*->.* 0\.2500 ", said): fail(said)
     # The same against the pulled file and the pulled image, without a controller; the same set changes nothing.
     for file in ("active.yaml", "active.bin"):

@@ -111,17 +111,22 @@ inline std::size_t make_image(Set set, std::uint8_t* out, std::size_t size) {
   return flexcomp::encode_image(list, header, out, size);
 }
 
-/// Writes the image and its seal (firmware/include/flexcomp_firmware/store.hpp). False where it does not fit.
+/// Writes the seal of the image that is there (firmware/include/flexcomp_firmware/store.hpp).
+inline void seal(Storage& storage, std::size_t size) {
+  std::uint8_t* at = storage.bytes + FLEXCOMP_SLOT_BYTES - 32;
+  std::memset(at, 0, 32);
+  std::memcpy(at, "FLXS", 4);
+  flexcomp::store_u32(at + 4, static_cast<std::uint32_t>(size));
+  flexcomp::store_u32(at + 8, 1);
+  flexcomp::store_u32(at + 12, flexcomp::load_u32(storage.bytes + size - 4));
+  flexcomp::store_u32(at + 28, flexcomp::crc32(at, 28));
+}
+
+/// Writes the image and its seal. False where it does not fit.
 inline bool store_image(Set set, Storage& storage) {
   const std::size_t size = make_image(set, storage.bytes, FLEXCOMP_STAGING_BYTES);
   if (size == 0) return false;
-  std::uint8_t* seal = storage.bytes + FLEXCOMP_SLOT_BYTES - 32;
-  std::memset(seal, 0, 32);
-  std::memcpy(seal, "FLXS", 4);
-  flexcomp::store_u32(seal + 4, static_cast<std::uint32_t>(size));
-  flexcomp::store_u32(seal + 8, 1);
-  flexcomp::store_u32(seal + 12, flexcomp::load_u32(storage.bytes + size - 4));
-  flexcomp::store_u32(seal + 28, flexcomp::crc32(seal, 28));
+  seal(storage, size);
   return true;
 }
 

@@ -52,6 +52,9 @@ set_tests_properties(target/instructions_are_compared PROPERTIES
   PASS_REGULAR_EXPRESSION "SDO request .* documented 100 .*ABOVE what is documented")
 add_test(NAME target/budget COMMAND ${counting} $<TARGET_FILE:budget>)
 set_tests_properties(target/budget PROPERTIES TIMEOUT 60 LABELS target)
+add_test(NAME target/step_cost COMMAND ${counting} $<TARGET_FILE:target_step_cost>)
+add_test(NAME target/check_slices COMMAND ${counting} $<TARGET_FILE:target_check_slices>)
+set_tests_properties(target/step_cost target/check_slices PROPERTIES TIMEOUT 60 LABELS target)
 add_custom_target(instructions COMMAND ${figures} instructions update ${instructions_of} VERBATIM)
 
 # The call graph's answer against a run.

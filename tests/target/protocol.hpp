@@ -25,7 +25,7 @@ using flexcomp::wire::Command;
 
 /// What has been sent, one entry after the other: a letter, the length (u16) and the bytes.
 struct Transcript {
-  std::array<std::uint8_t, 16384> bytes{};
+  std::array<std::uint8_t, 32768> bytes{};
   std::size_t size = 0;
   bool full = false;
 
@@ -72,6 +72,8 @@ class Exchange {
     read_registers(map::capability, map::capability_registers);
     stage(first);
     command(Command::verify, 0);
+    cycles(64);
+    read_registers(map::status, map::status_registers);
     command(Command::commit, 0);
     cycles(24);
     read_registers(map::status, map::status_registers);
@@ -88,7 +90,7 @@ class Exchange {
     download(co::image, co::image_staging, second.data(), second.size());
     std::uint8_t commit[2] = {static_cast<std::uint8_t>(Command::commit), 0};
     expedited(co::command, co::command_number, commit, sizeof commit);
-    cycles(24);
+    cycles(88);
     upload(co::status, 0);
     upload(co::capability, 0);
     upload(co::identity, 4);
@@ -107,7 +109,7 @@ class Exchange {
     const unsigned answer = flexcomp_command(fc_, FLEXCOMP_COMMAND_ROLLBACK);
     const auto said = static_cast<std::uint8_t>(answer);
     transcript_.add('A', &said, 1);
-    cycles(24);
+    cycles(88);
     state();
     return start(robot);  // the next power-up finds the first set alone
   }

@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "flexcomp/arm_state.hpp"
+#include "flexcomp/image.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp_firmware/config.hpp"
 
@@ -25,8 +26,12 @@ void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
 RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints& q_rad,
                                        const Joints& q_command_rad, const FirmwareContext& context);
 
-/// model_from_image() of the core: prepares a model from an image that check_image() accepted.
-Refusal build_model(const std::uint8_t* image, std::size_t size, const Robot& robot, FirmwareModel& model);
+/// Model::begin() of the core.
+void begin_model(const Robot& robot, FirmwareModel& model);
+/// Adds the record at the cursor, which is not at the end, to a model.
+Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cursor, FirmwareModel& model);
+/// Model::finish() of the core.
+void finish_model(FirmwareModel& model);
 
 }  // namespace firmware
 }  // namespace flexcomp

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "flexcomp/admission.hpp"
 #include "flexcomp/model.hpp"
 #include "flexcomp/robot.hpp"
 #include "flexcomp_config.h"
@@ -21,6 +22,8 @@ constexpr std::size_t joints = 6;  ///< of an arm
 using FirmwareCapacity = Capacity<FLEXCOMP_TERMS, FLEXCOMP_TABLES, FLEXCOMP_TABLE_VALUES>;
 /// A prepared set.
 using FirmwareModel = Model<Scalar, joints, FirmwareCapacity>;
+/// Bounds of a prepared set.
+using FirmwareCertificate = Certificate<Scalar, joints>;
 /// Context of one command.
 using FirmwareContext = Context<Scalar, joints>;
 using Joints = std::array<Scalar, joints>;  ///< rad

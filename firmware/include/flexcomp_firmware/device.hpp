@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 
+#include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
 #include "flexcomp_firmware/config.hpp"
@@ -60,6 +61,11 @@ class Device {
   wire::Capability capability() const;
   /// Status record.
   wire::Status status() const;
+
+  /// Certificate record of the active set.
+  wire::CertificateRecord certificate() const;
+  /// Value of 0x2005 (canopen_objects.hpp), sub-index 1 … 9, a real as binary32 bits; 0 without a set.
+  std::uint32_t certificate_summary(std::size_t sub) const;
 
   /// Writes the robot record into `out`, of wire::robot_record_bytes.
   void robot_record(wire::ByteOrder order, std::uint8_t* out) const;

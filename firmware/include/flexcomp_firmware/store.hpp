@@ -63,6 +63,10 @@ struct StoreSettings {
   Scalar plausible_position_m = Scalar(0.05);
   /// The same for the orientation, below pi / 2.
   Scalar plausible_orientation_rad = Scalar(0.1);
+  /// A set whose bounds exceed these is refused by the name of a term (docs/compensation.md, section "Admission").
+  AdmissionLimits<Scalar> limits{};
+  /// What the context of a step may say; a negative member: as default_ranges() has it.
+  AdmissionRanges<Scalar> ranges = undeclared_ranges<Scalar>();
   /// Control cycles of a trial where the command names none.
   std::uint32_t trial_cycles = 60000;
   /// Silence after which a transfer is discarded, ms.
@@ -83,7 +87,8 @@ class Store {
   Store& operator=(const Store&) = delete;
 
   /// Before the control cycle starts: the highest valid sequence becomes active, else the other slot with the
-  /// fault `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again.
+  /// fault `older_slot`, else nothing with the fault `no_valid_set`. Must not be called again. It checks at once what
+  /// poll() checks in slices.
   void boot();
 
   /// Runs one command of the wire; its answer is also in status().
@@ -105,7 +110,8 @@ class Store {
   /// fails.
   bool read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size);
 
-  /// Background work; at most one storage call of 256 bytes each time. now_ms wraps.
+  /// Background work; at most one storage call of 256 bytes, or a slice of a check of at most 20,000 instructions (Cortex-M7,
+  /// default capacity), each time. now_ms wraps.
   void poll(std::uint32_t now_ms);
 
   /// Fills the fields of the store in the status record.
@@ -113,6 +119,9 @@ class Store {
 
   /// The prepared set that is active, or null; valid until the next poll() or run().
   const FirmwareModel* active_model() const;
+
+  /// Bounds of the active set, or null; valid as active_model() is.
+  const FirmwareCertificate* active_certificate() const;
 
   std::uint32_t active_bytes() const { return active_.bytes; }        ///< of the active image
   std::uint32_t active_sequence() const { return active_.sequence; }  ///< 0: none
@@ -134,6 +143,8 @@ class Store {
   };
   enum class Job : std::uint8_t {
     none,
+    load,           ///< rollback: read the set in the other slot
+    check,          ///< verify, commit, rollback: the image in the staging memory, in slices
     erase,          ///< commit: the inactive slot
     write,          ///< commit: the image
     compare,        ///< commit: read back
@@ -158,10 +169,21 @@ class Store {
   bool owns(Origin origin) const { return origin == owner_; }
   void release();
   bool free_model(std::uint32_t& index) const;
-  Refusal prepare(std::uint32_t size, FirmwareModel& model, ImageHeader& header, std::uint32_t& detail);
-  bool plausible(const FirmwareModel& model, std::uint32_t& detail) const;
+  /// What comes next in the check of an image; each is some slices.
+  enum class Check : std::uint8_t { header, checksum, records, finish, probes, bounds, verdict };
+  /// What a check is for.
+  enum class Purpose : std::uint8_t { verify, commit, rollback };
+  void begin_check(std::uint32_t size, std::uint32_t index);
+  bool check_slice(Refusal& r, std::uint32_t& detail);
+  void checked(Refusal r, std::uint32_t detail);
+  void begin_commit();
+  std::uint32_t used_model() const;
+  bool plausible(const FirmwareModel& model, std::uint32_t pose, std::uint32_t& detail) const;
   bool read_seal(unsigned slot, Set& set);
   bool load(const Set& set);
+  bool is_in_staging(const Set& set) const;
+  /// A check that no commit waits for; its client may give it up.
+  bool is_verifying() const { return job_ == Job::check && purpose_ == Purpose::verify; }
   void fail();
   void finish(wire::Answer a);
   void make_active(const Set& set);
@@ -186,10 +208,20 @@ class Store {
   std::uint32_t announced_ = 0;
   std::uint32_t staged_ = 0;
 
+  std::array<FirmwareCertificate, 2> certificates_{};  ///< of the models
+
   Set active_{};
   Set previous_{};  ///< what the other slot holds, or what a trial falls back to
   Set incoming_{};  ///< what is verified, written or on trial
   Job job_ = Job::none;
+  Check check_ = Check::header;
+  Purpose purpose_ = Purpose::verify;
+  std::uint32_t check_index_ = 0;  ///< of the model that the image is prepared in
+  std::uint32_t check_bytes_ = 0;
+  std::uint32_t check_crc_ = 0;  ///< of the bytes so far
+  ImageHeader header_{};         ///< of the image that is checked
+  ImageCursor cursor_{};
+  Admission<Scalar, joints> admission_{};
   std::uint32_t progress_ = 0;
   bool job_trial_ = false;
   std::uint32_t job_trial_cycles_ = 0;

@@ -146,7 +146,14 @@ template <class S>
 FLEXCOMP_ONCE Cell<S> find_cell(const S* nodes, std::size_t count, const S& x) {
   if (!(x > nodes[0])) return {0, S(0)};
   std::size_t k = 0;
-  while (k + 2 < count && x >= nodes[k + 1]) ++k;  // at most 64 nodes
+  for (std::size_t end = count - 1; end - k > 1;) {  // at most 64 nodes: six halvings
+    const std::size_t middle = (k + end) / 2;
+    if (x >= nodes[middle]) {
+      k = middle;
+    } else {
+      end = middle;
+    }
+  }
   if (x >= nodes[k + 1]) return {k, S(1)};
   return {k, (x - nodes[k]) / (nodes[k + 1] - nodes[k])};
 }

@@ -106,26 +106,44 @@ class CyclePlan {
   void sort(const Model& model) {
     for (S& c : compliance_) c = S(0);
     needs_loads_ = needs_moments_ = false;
-    std::size_t n = 0;
-    for (std::uint8_t g = 0; g <= group::own_compliance; ++g) {
-      for (std::size_t k = 0; k < model.effect_count(); ++k) {
-        const Term<S>& t = model.effect(k);
-        if (effect_group<N>(t) != g) continue;
-        if (flexcomp::needs_loads(t.basis, t.factor)) needs_loads_ = true;
-        if (is_moment(t.basis)) needs_moments_ = true;
-        if (g == group::own_compliance) {
-          compliance_[t.joint] += t.coefficient;
-          continue;
-        }
-        std::size_t at = n++;
-        // Equal levers side by side, so that each is taken once.
-        if (g == group::lever) {
-          for (; at > 0 && comes_before(t, model.effect(order_[at - 1])); --at) order_[at] = order_[at - 1];
-        }
-        order_[at] = static_cast<Count>(k);
-      }
-      if (g < group::count) end_[g] = static_cast<Count>(n);
+    std::array<std::uint8_t, Cap::terms> group_of{};
+    for (std::size_t k = 0; k < model.effect_count(); ++k) {
+      const Term<S>& t = model.effect(k);
+      group_of[k] = effect_group<N>(t);
+      if (flexcomp::needs_loads(t.basis, t.factor)) needs_loads_ = true;
+      if (is_moment(t.basis)) needs_moments_ = true;
+      if (group_of[k] == group::own_compliance) compliance_[t.joint] += t.coefficient;
     }
+    std::size_t n = 0;
+    for (std::uint8_t g = 0; g < group::count; ++g) {
+      if (g == group::lever) {
+        n = order_levers(model, group_of);
+      } else {
+        for (std::size_t k = 0; k < model.effect_count(); ++k) {
+          if (group_of[k] == g) order_[n++] = static_cast<Count>(k);
+        }
+      }
+      end_[g] = static_cast<Count>(n);
+    }
+  }
+
+  /// Orders the levers, the first group, by joint and distal joint, so that each is taken once; their number. Counting
+  /// sort: work linear in the terms.
+  template <class Model>
+  std::size_t order_levers(const Model& model, const std::array<std::uint8_t, Cap::terms>& group_of) {
+    const auto key = [&model](std::size_t k) {
+      return model.effect(k).joint * N + model.effect(k).distal_joint;
+    };
+    std::array<Count, N * N + 1> start{};
+    for (std::size_t k = 0; k < model.effect_count(); ++k) {
+      if (group_of[k] == group::lever) ++start[key(k) + 1];
+    }
+    for (std::size_t i = 0; i < N * N; ++i) start[i + 1] = static_cast<Count>(start[i + 1] + start[i]);
+    const std::size_t count = start[N * N];
+    for (std::size_t k = 0; k < model.effect_count(); ++k) {
+      if (group_of[k] == group::lever) order_[start[key(k)]++] = static_cast<Count>(k);
+    }
+    return count;
   }
 
   template <class Model>
@@ -149,10 +167,6 @@ class CyclePlan {
   static bool is_moment(Basis b) {
     return b == Basis::load_moment_x || b == Basis::load_moment_y || b == Basis::base_moment_x ||
            b == Basis::base_moment_y;
-  }
-
-  static bool comes_before(const Term<S>& a, const Term<S>& b) {
-    return a.joint != b.joint ? a.joint < b.joint : a.distal_joint < b.distal_joint;
   }
 
   std::array<S, N> compliance_{};

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
 
@@ -74,6 +75,17 @@ constexpr Object objects[] = {
     {status_summary, 6, Type::u32, Access::ro, 4, "Detail"},
     {status_summary, 7, Type::u32, Access::ro, 4, "Control cycles until a trial reverts"},
     {robot, 0, Type::domain, Access::ro, robot_record_bytes, "Robot record"},
+    {certificate, 0, Type::domain, Access::ro, certificate_bytes, "Certificate record"},
+    {certificate_summary, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {certificate_summary, 1, Type::u32, Access::ro, 4, "Instructions of a step, at most"},
+    {certificate_summary, 2, Type::real32, Access::ro, 4, "Size of the set at the tool, at most, mm"},
+    {certificate_summary, 3, Type::real32, Access::ro, 4, "Turn of the tool by the set, at most, deg"},
+    {certificate_summary, 4, Type::real32, Access::ro, 4, "Deflection of joint 1, at most, deg"},
+    {certificate_summary, 5, Type::real32, Access::ro, 4, "Deflection of joint 2, at most, deg"},
+    {certificate_summary, 6, Type::real32, Access::ro, 4, "Deflection of joint 3, at most, deg"},
+    {certificate_summary, 7, Type::real32, Access::ro, 4, "Deflection of joint 4, at most, deg"},
+    {certificate_summary, 8, Type::real32, Access::ro, 4, "Deflection of joint 5, at most, deg"},
+    {certificate_summary, 9, Type::real32, Access::ro, 4, "Deflection of joint 6, at most, deg"},
     {image, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {image, image_staging, Type::domain, Access::wo, 0, "Parameter image into staging"},
     {image, image_active, Type::domain, Access::ro, 0, "Active parameter image"},
@@ -108,6 +120,8 @@ constexpr const char* record_name(std::uint16_t index) {
       return "SDO server parameter";
     case status_summary:
       return "Status for people";
+    case certificate_summary:
+      return "Certificate for people";
     case image:
       return "Parameter image";
     case command:

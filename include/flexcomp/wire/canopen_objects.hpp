@@ -32,6 +32,12 @@
 ///              6  UNSIGNED32      ro      detail
 ///              7  UNSIGNED32      ro      control cycles until a trial reverts
 ///     0x2003   0  DOMAIN          ro      robot record (robot_record.hpp)
+///     0x2004   0  DOMAIN          ro      certificate record of the active set (certificate_record.hpp)
+///     0x2005   0  UNSIGNED8       const   9: certificate as single values
+///              1  UNSIGNED32      ro      instructions of a step, at most
+///              2  REAL32          ro      size of the set at the tool, at most, mm
+///              3  REAL32          ro      the same, orientation, deg
+///            4-9  REAL32          ro      deflection of joint 1 … 6, at most, deg
 ///     0x2010   0  UNSIGNED8       const   2
 ///              1  DOMAIN          wo      image into staging
 ///              2  DOMAIN          ro      active image, byte for byte
@@ -48,7 +54,8 @@
 /// - A download to 0x2010:1 is `begin` and the bytes in one: an indicated size announces the length,
 ///   otherwise the length is known at the end. It goes to staging only; an aborted or timed-out transfer
 ///   leaves nothing behind. Then verify, commit and so on by 0x2011:2, or "save" by 0x1010:1.
-/// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest.
+/// - A command that is refused aborts the transfer with a code of abort_code(); 0x2001 says the rest. What comes
+///   out in the background (verify, commit and so on) is only there: poll 0x2002:1 until it is not 3.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by a bounded motion,
 ///   because between the two a controller would run a set that it can no longer read back.
 /// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
@@ -163,6 +170,7 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::unknown_basis:
     case Refusal::bad_place:
     case Refusal::mounting:
+    case Refusal::not_allowed_covariate:
       return abort::incompatible;
     case Refusal::bad_value:
       return abort::value;
@@ -170,6 +178,10 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::table_too_large:
       return abort::out_of_memory;
     case Refusal::implausible:
+    case Refusal::too_large:
+    case Refusal::too_steep:
+    case Refusal::too_compliant:
+    case Refusal::too_costly:
       return abort::value_too_high;
     case Refusal::stale_sequence:
       return abort::value_too_low;

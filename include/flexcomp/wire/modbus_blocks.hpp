@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/modbus_map.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 
@@ -30,6 +31,7 @@ enum class Block : std::uint8_t {
   probe_response,  ///< probe response record
   corrections,     ///< of the last control cycle, binary32
   robot,           ///< robot record
+  certificate,     ///< certificate record
 };
 
 /// One block of the map.
@@ -68,6 +70,8 @@ constexpr BlockDescription block_descriptions[] = {
     {Block::corrections, corrections, corrections_registers, true, false, "people",
      "corrections of the last control cycle, and the largest since the start"},
     {Block::robot, robot, robot_registers, true, false, "robot", "the nominal robot"},
+    {Block::certificate, certificate, certificate_registers, true, false, "certificate",
+     "what the active set can do at most, and what a step costs"},
 };
 /// Number of blocks.
 constexpr std::size_t block_count = sizeof block_descriptions / sizeof block_descriptions[0];

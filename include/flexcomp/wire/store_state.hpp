@@ -42,10 +42,15 @@
 /// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are
 /// 0.
 ///
-/// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). Commands
-/// that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
+/// A refusal by admission (Refusal::too_large and after) has in its detail the index of the term among those that are not
+/// constant, from 0, in the order of the image; Refusal::too_costly the number of instructions.
+///
+/// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). verify and the
+/// commands that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
 /// when they are accepted and then run in the background: the state is `working` until they end, and answer,
-/// refusal and detail then tell how. A client polls the status until the state is no longer `working`.
+/// refusal and detail then tell how. A client polls the status until the state is no longer `working`: after verify
+/// it is `verified`, or `idle` with the refusal. A commit that comes while its client's verify is still working
+/// follows by itself where the set is good; abort, and the end of the connection, give a verify up.
 #ifndef FLEXCOMP_WIRE_STORE_STATE_HPP
 #define FLEXCOMP_WIRE_STORE_STATE_HPP
 
@@ -68,7 +73,7 @@ enum class StoreState : std::uint16_t {
   idle = 0,       ///< nothing staged
   receiving = 1,  ///< bytes are coming in
   verified = 2,   ///< staged in full, checked and prepared; waits for commit
-  working = 3,    ///< non-volatile memory is being written
+  working = 3,    ///< a set is checked, or non-volatile memory is written
   trial = 4,      ///< a committed set runs on trial: confirm it or it reverts by itself
 };
 
@@ -76,7 +81,7 @@ enum class StoreState : std::uint16_t {
 enum class Command : std::uint16_t {
   none = 0,          ///< does nothing
   begin = 1,         ///< announces an image; argument: its length in bytes
-  verify = 2,        ///< checks the staged image and prepares it
+  verify = 2,        ///< checks the staged image and prepares it, in the background
   commit = 3,        ///< writes it to the inactive slot and activates it; verifies first where needed
   commit_trial = 4,  ///< the same, but reverts unless confirmed; argument: control cycles, 0 = as configured
   confirm = 5,       ///< makes the set on trial permanent

@@ -80,7 +80,9 @@ class Controller:
 
     def push_refused(self):
         self.stage(self.random.choice(self.refused))
-        check(self.master.command(VERIFY) == 4 and self.master.status()["answer"] == 1, "a spoiled image is refused")
+        check(self.master.command(VERIFY) == 0, "the check of a spoiled image begins")
+        status = self.settle()
+        check(status["answer"] == 1, "and it is refused", status)
 
     def run(self, command):
         check(self.master.command(command) == 0, f"command {command}")
