@@ -48,35 +48,6 @@ constexpr std::uint16_t event_flags =
 
 }  // namespace
 
-FLEXCOMP_RARE ContextSensitivity sensitivity_of(const FirmwareModel& model) {
-  ContextSensitivity bound;
-  Scalar other = Scalar(0);  // compliance to the torque of another joint, or of another slot
-  for (std::size_t k = 0; k < model.effect_count(); ++k) {
-    const Term<Scalar>& t = model.effect(k);
-    if (t.basis == Basis::thermal) bound.rad_per_k += std::fabs(t.coefficient);
-    if (t.basis == Basis::load_torque && (t.place.slot != slot::theta || t.place.body != t.joint + 1U))
-      other += std::fabs(t.coefficient);
-  }
-  Scalar com = Scalar(0);
-  Scalar reach = Scalar(0);
-  for (int k = 0; k < 3; ++k) {
-    com += std::fabs(from_binary64<Scalar>(model.robot().payload_com_m[static_cast<std::size_t>(k)]));
-    reach += std::fabs(model.nominal_tool().position[k]);
-  }
-  const Scalar gravity = std::sqrt(dot<Scalar>(model.gravity(), model.gravity()));
-  for (std::size_t i = joints; i-- > 0;) {
-    reach += std::fabs(model.nominal(i).d) + std::fabs(model.nominal(i).a);
-    const Scalar compliance = std::fabs(model.plan().compliance(i)) + other;
-    const Scalar per_n = compliance * reach;
-    const Scalar per_kg = compliance * (reach + com) * gravity;
-    const Scalar per_kg_m = compliance * gravity;
-    if (per_n > bound.rad_per_n) bound.rad_per_n = per_n;
-    if (per_kg > bound.rad_per_kg) bound.rad_per_kg = per_kg;
-    if (per_kg_m > bound.rad_per_kg_m) bound.rad_per_kg_m = per_kg_m;
-  }
-  return bound;
-}
-
 ControlCycle::ControlCycle(const Robot& robot, ParameterSets& sets, const ControlSettings& settings)
     : sets_(sets),
       settings_(sensible(settings)),
@@ -137,10 +108,12 @@ bool ControlCycle::context_jumped(const FirmwareContext& context) {
     last_force_[k] = context.force_n[k];
     last_com_[k] = context.payload_com_m[k];
   }
-  const Scalar motion = force * sensitivity_.rad_per_n +
-                        com * std::fabs(context.payload_kg) * sensitivity_.rad_per_kg_m +
-                        std::fabs(context.payload_kg - last_payload_) * sensitivity_.rad_per_kg +
-                        std::fabs(context.temperature_c - last_temperature_) * sensitivity_.rad_per_k;
+  Scalar motion = Scalar(0);
+  if (certificate_ != nullptr) {
+    motion = force * certificate_->rad_per_n + com * certificate_->rad_per_m +
+             std::fabs(context.payload_kg - last_payload_) * certificate_->rad_per_kg +
+             std::fabs(context.temperature_c - last_temperature_) * certificate_->rad_per_k;
+  }
   last_payload_ = context.payload_kg;
   last_temperature_ = context.temperature_c;
   return !(motion <= output_.motion_change_most());
@@ -179,7 +152,7 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
   const std::uint32_t index = sets_.handover.take(changed);
   if (changed) {
     is_new_set_ = true;  // an event of the next command that is used
-    if (index != Handover::none) sensitivity_ = sensitivity_of(sets_.models[index]);
+    certificate_ = index != Handover::none ? &sets_.certificates[index] : nullptr;
   }
   FiniteCheck<Scalar> command;
   command.add(q_command_rad);
@@ -206,7 +179,17 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
     const bool event = jumped || is_new_set_ || cause != last_cause_;
     last_cause_ = cause;
     is_new_set_ = false;
-    out.flags |= output_.follow(q_command_rad, event, out.q);
+    const Joints wanted = out.q;
+    const std::uint16_t held = output_.follow(q_command_rad, event, out.q);
+    if (held != 0) {
+      // What is missing to the wanted command turns the tool by as much at most, and moves it by as much at the reach.
+      Scalar missing = Scalar(0);
+      for (std::size_t j = 0; j < joints; ++j) missing += std::fabs(out.q[j] - wanted[j]);
+      out.remaining_orientation_rad += missing;
+      if (certificate_ != nullptr) missing *= certificate_->reach_m;
+      out.remaining_position_m += missing;
+    }
+    out.flags |= held;
   } else {
     output_.hold(q_command_rad, out.q);
   }

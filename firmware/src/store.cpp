@@ -252,7 +252,7 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       }
       return false;
     case Check::verdict:
-      r = admission_.finish(model, certificates_[check_index_], detail);
+      r = admission_.finish(model, sets_.certificates[check_index_], detail);
       return true;
   }
   return true;
@@ -730,7 +730,7 @@ const FirmwareModel* Store::active_model() const {
 
 const FirmwareCertificate* Store::active_certificate() const {
   const std::uint32_t index = used_model();
-  return index == Handover::none ? nullptr : &certificates_[index];
+  return index == Handover::none ? nullptr : &sets_.certificates[index];
 }
 
 void Store::status(wire::Status& out) const {

@@ -45,7 +45,7 @@ class Model {
   static constexpr std::size_t most_tables = Cap::tables;  ///< that it holds
 
   /// Resets to the nominal robot without terms.
-  void begin(const NominalRobot<N>& robot) {
+  FLEXCOMP_RARE void begin(const NominalRobot<N>& robot) {
     // Member by member: a temporary of this size does not fit on a controller's stack.
     robot_ = robot;
     constant_ = {};
@@ -129,7 +129,7 @@ class Model {
 
   /// Appends a term. Tables come before the terms that read them. Refusal: bad_place, unknown_basis,
   /// bad_value, mounting, too_many_terms.
-  Refusal add(const Term<S>& term) {
+  FLEXCOMP_RARE Refusal add(const Term<S>& term) {
     const Place p = term.place;
     const bool link = p.body >= 1 && p.body <= N;
     if (!(link && p.slot <= slot::gamma) && !(p.body == body::base && p.slot <= slot::rz) &&
@@ -182,7 +182,7 @@ class Model {
   }
 
   /// Adds up the constant terms and plans the control cycle. Called once, after the last add().
-  void finish() {
+  FLEXCOMP_RARE void finish() {
     for (std::size_t i = 0; i < N; ++i) {
       shape_[i] = nominal_[i];
       shape_[i].offset = rotate(nominal_[i].offset, constant_[i][slot::theta]);

@@ -67,7 +67,7 @@ namespace detail {
 /// model do at their worst. Not the certificate's size, which is at ranges that a controller declares: these thresholds are
 /// the same on every host and controller. Work linear in terms and table values.
 template <class M>
-inline ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
+FLEXCOMP_RARE ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
   using S = typename M::Scalar;
   using std::sqrt;
   constexpr std::size_t n = M::joints;

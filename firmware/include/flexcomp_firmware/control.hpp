@@ -18,10 +18,11 @@
 namespace flexcomp {
 namespace firmware {
 
-/// The two prepared sets and their handover.
+/// The two prepared sets with their certificates, and their handover.
 struct ParameterSets {
-  std::array<FirmwareModel, 2> models{};  ///< one is used, the other may be prepared
-  Handover handover{};                    ///< which one is used
+  std::array<FirmwareModel, 2> models{};              ///< one is used, the other may be prepared
+  std::array<FirmwareCertificate, 2> certificates{};  ///< of the models, by which they were admitted
+  Handover handover{};                                ///< which one is used
 };
 
 /// Output for a command that is refused: not finite, beyond a joint limit, or with a context that is not
@@ -43,18 +44,6 @@ struct ControlSettings {
   Scalar direction_band_rad = Scalar(1e-4);
   OnRefusal on_refusal = OnRefusal::hold;  ///< output for a refused command
 };
-
-/// Largest motion of any joint's correction per change of the context.
-struct ContextSensitivity {
-  Scalar rad_per_kg = Scalar(0);    ///< of the payload's mass
-  Scalar rad_per_n = Scalar(0);     ///< of each component of the external force
-  Scalar rad_per_kg_m = Scalar(0);  ///< of each coordinate of the centre of mass, times the mass
-  Scalar rad_per_k = Scalar(0);     ///< of the temperature
-};
-
-/// Bounds the sensitivity of a set to its context: statics of the outstretched arm at the compliances, and
-/// thermal lengths at the reach. Effects of other load moments, cubes and tables are not in it.
-ContextSensitivity sensitivity_of(const FirmwareModel& model);
 
 /// Result of a step.
 using StepResult = Compensated<Scalar, joints>;
@@ -117,7 +106,7 @@ class ControlCycle {
   Joints lower_{};
   Joints upper_{};
   OutputStage<Scalar, joints> output_;
-  ContextSensitivity sensitivity_{};
+  const FirmwareCertificate* certificate_ = nullptr;  ///< of the set in use
   Scalar band_inverse_ = Scalar(0);
   Joints direction_{};
   Joints last_command_{};

@@ -14,13 +14,6 @@
 #include "flexcomp/detail/compiler.hpp"
 #include "flexcomp/status.hpp"
 
-/// For what runs at the start or for some cycles after an event: small rather than fast.
-#if defined(__GNUC__)
-#define FLEXCOMP_RARE __attribute__((noinline, cold))
-#else
-#define FLEXCOMP_RARE
-#endif
-
 namespace flexcomp {
 namespace firmware {
 

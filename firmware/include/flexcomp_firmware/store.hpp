@@ -208,8 +208,6 @@ class Store {
   std::uint32_t announced_ = 0;
   std::uint32_t staged_ = 0;
 
-  std::array<FirmwareCertificate, 2> certificates_{};  ///< of the models
-
   Set active_{};
   Set previous_{};  ///< what the other slot holds, or what a trial falls back to
   Set incoming_{};  ///< what is verified, written or on trial

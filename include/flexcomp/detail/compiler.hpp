@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What the core asks of the compiler beyond the language. Both are only about speed and size.
+/// What the core asks of the compiler beyond the language. All of it is only about speed and size.
 #ifndef FLEXCOMP_DETAIL_COMPILER_HPP
 #define FLEXCOMP_DETAIL_COMPILER_HPP
 
@@ -18,6 +18,13 @@
 #define FLEXCOMP_ONCE __attribute__((noinline))
 #else
 #define FLEXCOMP_ONCE
+#endif
+
+/// For what runs at the start, in the background, or for some cycles after an event: small rather than fast.
+#if defined(__GNUC__)
+#define FLEXCOMP_RARE __attribute__((noinline, cold))
+#else
+#define FLEXCOMP_RARE
 #endif
 
 #endif

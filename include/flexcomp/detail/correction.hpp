@@ -90,7 +90,7 @@ class Correction {
   /// Rate of the readings (rad/s) for the command's rate (C22), the derivative of what run() gave as q where nothing was
   /// given up; context and set stand still. Work: at most 9 chain
   /// passes, 20 linear solutions, 8 evaluations of the effects.
-  void rate(const std::array<S, N>& q, std::array<S, N>& out) {
+  FLEXCOMP_RARE void rate(const std::array<S, N>& q, std::array<S, N>& out) {
     // J of the chain as it stands, linear in the rates.
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) turn[i] = psi_[i] - q[i] + ahead_[i];
@@ -139,7 +139,8 @@ class Correction {
 
   /// Rest (C5) at the readings q (rad) for a command: position (m), orientation (rad), and the trace of its rotation. Work:
   /// two chain passes, one evaluation of the effects.
-  S rest(const std::array<S, N>& q_command, const std::array<S, N>& q, Vec3<S>& shift, Vec3<S>& turn) {
+  FLEXCOMP_RARE S rest(const std::array<S, N>& q_command, const std::array<S, N>& q, Vec3<S>& shift,
+                       Vec3<S>& turn) {
     take_nominal(q_command);
     take_load();
     sin_cos_all(q, model_.shapes(), angle_);
@@ -348,7 +349,7 @@ class Correction {
 
   /// Rates of the effects for rates of the readings, by central differences along them: deflections (rad/s) and, where
   /// links move, what they add to the rate at which the chain (its angles in `chain`) has to follow its target.
-  FLEXCOMP_ONCE void effect_rates(const std::array<S, N>& q, const std::array<S, N>& q_rate,
+  FLEXCOMP_RARE void effect_rates(const std::array<S, N>& q, const std::array<S, N>& q_rate,
                                   const std::array<SinCos<S>, N>& chain, SmallMotion<S>& rest) {
     const S greatest = greatest_of(q_rate);
     if (!(greatest > S(0)) || !(loaded_ || moves_ || model_.plan().size(group::other) != 0)) return;
@@ -376,7 +377,7 @@ class Correction {
   }
 
   /// What the last correction of the chain leaves.
-  FLEXCOMP_ONCE void chain_left(const Vec3<S>& shift, const Vec3<S>& turn, const Vec3<S>& point,
+  FLEXCOMP_RARE void chain_left(const Vec3<S>& shift, const Vec3<S>& turn, const Vec3<S>& point,
                                 const std::array<S, N>& dq) {
     SmallMotion<S> move;
     motion(joints_, point, dq, move);

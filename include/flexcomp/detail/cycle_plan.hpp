@@ -61,7 +61,7 @@ class CyclePlan {
  public:
   /// Sorts the effects of a model whose chain, base and tool are prepared.
   template <class Model>
-  void set(const Model& model) {
+  FLEXCOMP_RARE void set(const Model& model) {
     sort(model);
     const Vector3<S>& g = model.gravity();
     using std::sqrt;
@@ -103,7 +103,7 @@ class CyclePlan {
   using Count = std::conditional_t<Cap::terms <= 255, std::uint8_t, std::uint16_t>;
 
   template <class Model>
-  void sort(const Model& model) {
+  FLEXCOMP_RARE void sort(const Model& model) {
     for (S& c : compliance_) c = S(0);
     needs_loads_ = needs_moments_ = false;
     std::array<std::uint8_t, Cap::terms> group_of{};
@@ -147,7 +147,7 @@ class CyclePlan {
   }
 
   template <class Model>
-  void compute_twists(const Model& model) {
+  FLEXCOMP_RARE void compute_twists(const Model& model) {
     for (std::size_t i = 0; i < N; ++i) {
       const SinCos<S> none = {S(0), S(1)};
       link_twist_[i] = twist_between(link_at_zero(model.nominal(i), none),

@@ -68,7 +68,7 @@ inline S trace_of_product(const Symmetric<S>& a, const Symmetric<S>& b) {
 /// Inverse of a symmetric positive matrix by its L D L^T factors, and its determinant: errors grow with the condition
 /// number, those of the adjugate with its square.
 template <class S>
-inline S invert_factored(const Symmetric<S>& a, Symmetric<S>& inverse) {
+FLEXCOMP_RARE S invert_factored(const Symmetric<S>& a, Symmetric<S>& inverse) {
   const S x = S(1) / a.xx;
   const S l = a.xy * x, m = a.xz * x;
   const S d = a.yy - l * a.xy;
@@ -97,7 +97,8 @@ inline Symmetric<S> sum(const Symmetric<S>& a, const S& k, const Symmetric<S>& w
 /// Inverse of a symmetric positive block A, damped along W (C9) where the least eigenvalue of A against W is below
 /// `threshold`: true there.
 template <class S>
-inline bool damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, S threshold, Symmetric<S>& inverse) {
+FLEXCOMP_RARE bool damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, S threshold,
+                                  Symmetric<S>& inverse) {
   // The eigenvalues z of (A + t W)^-1 t W are t / (mu + t), with z^3 - e1 z^2 + e2 z - e3 = 0. All are real and at most 1:
   // from there Newton's method falls to the greatest one. The number of steps is fixed: a smooth function of A and W.
   const S t = threshold;
@@ -301,7 +302,7 @@ class DampedJacobianSolver {
   }
 
   /// The factorisation again from column_, with damping (C9) where an eigenvalue is below its threshold.
-  FLEXCOMP_ONCE void set_damped(const SingularRegion<S>& region) {
+  FLEXCOMP_RARE void set_damped(const SingularRegion<S>& region) {
     Symmetric<S> p{}, m{};
     Vec3<S> q[3] = {};
     for (const JointAxis<S>& c : column_) {
@@ -326,7 +327,7 @@ class DampedJacobianSolver {
     if (damped_inverse(m, w, region.orientation, orientation_)) damped_ = true;
   }
 
-  FLEXCOMP_ONCE S solve_limited(const Vec3<S>& u, const Vec3<S>& v, const Vec3<S>& w, S largest,
+  FLEXCOMP_RARE S solve_limited(const Vec3<S>& u, const Vec3<S>& v, const Vec3<S>& w, S largest,
                                 S largest_turn, std::array<S, N>& dq) {
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) {

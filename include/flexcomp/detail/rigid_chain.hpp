@@ -283,7 +283,7 @@ FLEXCOMP_ONCE void sin_cos_all(const std::array<S, N>& q, const std::array<LinkS
 
 /// rotate_all() for turns of any size.
 template <class S, std::size_t N>
-FLEXCOMP_ONCE void rotate_all_large(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
+FLEXCOMP_RARE void rotate_all_large(std::array<SinCos<S>, N>& angle, const std::array<S, N>& by) {
   for (std::size_t i = 0; i < N; ++i) angle[i] = rotate(angle[i], by[i]);
 }
 
