@@ -23,7 +23,9 @@ Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cur
 
 void begin_model(const Robot& robot, FirmwareModel& model) { model.begin(robot); }
 
-void finish_model(FirmwareModel& model) { model.finish(); }
+void finish_chain(FirmwareModel& model) { model.finish_chain(); }
+
+void finish_size(FirmwareModel& model) { model.finish_size(); }
 
 }  // namespace firmware
 }  // namespace flexcomp

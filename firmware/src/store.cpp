@@ -218,12 +218,16 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
         if (r == Refusal::table_too_large) detail = FirmwareCapacity::values;
         if (r != Refusal::none) return true;
       }
-      if (at_end(cursor_, check_bytes_)) check_ = Check::finish;
+      if (at_end(cursor_, check_bytes_)) check_ = Check::chain;
       return false;
-    case Check::finish:
+    case Check::chain:
       r = check_counts(header_, cursor_);
       if (r != Refusal::none) return true;
-      finish_model(model);
+      finish_chain(model);
+      check_ = Check::size;
+      return false;
+    case Check::size:
+      finish_size(model);
       // Before anything is evaluated: a probe pose takes a share of this.
       detail = step_instructions(model);
       if (detail > settings_.limits.instructions) {
@@ -242,7 +246,7 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       return false;
     case Check::bounds:
       for (unsigned n = 0; n < bounds_at_once; ++n) {
-        if (admission_.at_grid(model)) {
+        if (admission_.at_table(model)) {
           if (n != 0) return false;
           n = bounds_at_once;
         }

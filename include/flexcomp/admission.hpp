@@ -42,17 +42,17 @@ constexpr std::size_t measure_count = 12;     ///< all
 /// Greatest bounds of a set. The defaults are far above what calibrations of arms have shown.
 template <class S>
 struct AdmissionLimits {
-  S value_rad = S(0.02);               ///< Measure::value
-  S slope = S(0.25);                   ///< Measure::slope
-  S scale = S(0.01);                   ///< Measure::scale: encoder scale and coupling of 5e-3 each
-  S direction_rad = S(1e-3);           ///< Measure::direction
-  S compliance_rad_per_nm = S(5e-3);   ///< Measure::compliance
-  S rad_per_kg = S(5e-3);              ///< Measure::per_kg
-  S rad_per_n = S(1e-3);               ///< Measure::per_n
-  S load_rad = S(0.05);                ///< Measure::load
-  S rad_per_k = S(5e-5);               ///< Measure::per_k, and any coefficient of thermal growth (1/K)
-  S total_slope = S(0.5);              ///< Measure::total_slope
-  std::uint32_t instructions = 60000;  ///< of one step, by step_instructions()
+  S value_rad = S(0.02);                ///< Measure::value
+  S slope = S(0.25);                    ///< Measure::slope
+  S scale = S(0.01);                    ///< Measure::scale: encoder scale and coupling of 5e-3 each
+  S direction_rad = S(1e-3);            ///< Measure::direction
+  S compliance_rad_per_nm = S(5e-3);    ///< Measure::compliance
+  S rad_per_kg = S(5e-3);               ///< Measure::per_kg
+  S rad_per_n = S(1e-3);                ///< Measure::per_n
+  S load_rad = S(0.05);                 ///< Measure::load
+  S rad_per_k = S(5e-5);                ///< Measure::per_k, and any coefficient of thermal growth (1/K)
+  S total_slope = S(0.5);               ///< Measure::total_slope
+  std::uint32_t instructions = 100000;  ///< of one step, by step_instructions()
 
   /// The limit of one measure; measures that have none are not asked for.
   S of(Measure m) const {
@@ -172,12 +172,13 @@ struct Path {
   std::uint32_t base;                       ///< at the worst pose
   std::uint32_t loaded;                     ///< more where some term follows load or link weight
   std::uint32_t iterated;                   ///< more where some term follows other readings or the context
+  std::uint32_t frames;                     ///< more where base or tool move
   std::array<std::uint32_t, kernels> term;  ///< by kind
 };
-/// Sets whose terms all turn joints: at most eight evaluations of loads, seven of terms of other readings.
-constexpr Path joints_only = {10500, 5500, 3500, {0, 1000, 300, 1150, 900, 1150, 1700, 350, 150, 165, 40}};
-/// Sets that also move links, base or tool: three evaluations of all terms.
-constexpr Path off_joints = {20500, 2700, 0, {300, 360, 300, 700, 450, 580, 870, 280, 450, 580, 280}};
+/// Sets whose terms all turn joints: at most seven evaluations.
+constexpr Path joints_only = {14700, 7500, 3500, 0, {0, 1000, 340, 1350, 900, 1150, 1700, 350, 250, 220, 40}};
+/// Sets that also move links, base or tool: at most six evaluations, each with the chain.
+constexpr Path off_joints = {27000, 7200, 0, 5700, {0, 1130, 620, 1400, 1245, 1390, 1900, 545, 250, 220, 40}};
 
 /// True where the term turns the joint whose reading it follows.
 template <class S>
@@ -225,6 +226,7 @@ inline std::uint32_t step_instructions(const Model<S, N, Cap>& model) {
   const step_cost::Path& path = joints_only ? step_cost::joints_only : step_cost::off_joints;
   std::uint32_t sum = path.base;
   if (model.needs_loads()) sum += path.loaded;
+  if (model.base_moves() || model.tool_moves()) sum += path.frames;
   bool iterated = false;
   for (std::size_t k = 0; k < model.effect_count(); ++k) {
     const step_cost::Kernel kernel = step_cost::kernel_of(model.effect(k));
@@ -304,10 +306,10 @@ class Admission {
     return next_ < model.effect_count();
   }
 
-  /// True where the next call of advance() reads a grid, which takes as long as several other terms.
+  /// True where the next call of advance() reads a table, which takes as long as several other terms.
   template <class Cap>
-  bool at_grid(const Model<S, N, Cap>& model) const {
-    return next_ < model.effect_count() && model.effect(next_).basis == Basis::grid;
+  bool at_table(const Model<S, N, Cap>& model) const {
+    return next_ < model.effect_count() && model.effect(next_).table != no_table;
   }
 
   /// Fills the certificate; the verdict. `detail` is the term's index, or the number of instructions.

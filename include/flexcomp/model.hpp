@@ -181,8 +181,14 @@ class Model {
     return Refusal::none;
   }
 
-  /// Adds up the constant terms and plans the control cycle. Called once, after the last add().
-  FLEXCOMP_RARE void finish() {
+  /// Adds up the constant terms and plans the control cycle. Called once, after the last add(). A controller that may not
+  /// stay away long calls its two parts, finish_chain() and finish_size().
+  void finish() {
+    finish_chain();
+    finish_size();
+  }
+  /// First part of finish().
+  FLEXCOMP_RARE void finish_chain() {
     for (std::size_t i = 0; i < N; ++i) {
       shape_[i] = nominal_[i];
       shape_[i].offset = rotate(nominal_[i].offset, constant_[i][slot::theta]);
@@ -196,8 +202,9 @@ class Model {
     base_pose_ = small_pose(base_);
     tool_pose_ = nominal_tool_ * small_pose(tool_);
     plan_.set(*this);
-    tool_motion_ = detail::tool_motion_of(*this);
   }
+  /// Second part of finish().
+  void finish_size() { tool_motion_ = detail::tool_motion_of(*this); }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.
   Refusal prepare(const NominalRobot<N>& robot, const TermList<S>& list) {

@@ -80,7 +80,7 @@ FLEXCOMP_RARE ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
   for (std::size_t k = 0; k < model.table_count(); ++k) {
     const Table& table = model.table(k);
     const S* values = model.values(table);
-    for (std::size_t v = 0; v < table.size; ++v) {
+    for (std::size_t v = 0; v < table.size && table.rows == 0; ++v) {
       if (abs(values[v]) > greatest[k]) greatest[k] = abs(values[v]);
     }
   }

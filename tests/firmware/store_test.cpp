@@ -242,7 +242,7 @@ TEST(Store, TellsTheBoundsOfTheActiveSetOnly) {
   Arm arm;
   EXPECT_EQ(arm.device->certificate().sequence, 0U);
   EXPECT_EQ(arm.device->certificate().instructions, 0U);
-  EXPECT_EQ(arm.device->certificate().most_instructions, 60000U);
+  EXPECT_EQ(arm.device->certificate().most_instructions, 100000U);
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
   const wire::CertificateRecord one = arm.device->certificate();
   EXPECT_EQ(one.sequence, 1U);

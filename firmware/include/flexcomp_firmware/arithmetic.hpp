@@ -30,8 +30,10 @@ RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints&
 void begin_model(const Robot& robot, FirmwareModel& model);
 /// Adds the record at the cursor, which is not at the end, to a model.
 Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cursor, FirmwareModel& model);
-/// Model::finish() of the core.
-void finish_model(FirmwareModel& model);
+/// Model::finish_chain() of the core.
+void finish_chain(FirmwareModel& model);
+/// Model::finish_size() of the core.
+void finish_size(FirmwareModel& model);
 
 }  // namespace firmware
 }  // namespace flexcomp

@@ -28,8 +28,9 @@ namespace detail {
 /// Most refinements of a linear solution (C6). The error of the factored Jacobian, some 1e-2, is the ratio of each
 /// remainder to the one before.
 constexpr int most_refinements = 3;
-/// Most fixed-point steps of the deflection (C15).
+/// Most fixed-point steps of the deflection (C15); of a set that moves links, each of which solves the chain as well.
 constexpr int most_deflection_steps = 6;
+constexpr int most_moving_steps = 5;
 
 /// Rounds and refinements of the rate (C22).
 constexpr int rate_rounds = 4;
@@ -422,7 +423,8 @@ class Correction {
     }
     if (!loaded_ && !moves_ && model_.plan().size(group::other) == 0) return;
     S before_square = S(1);
-    for (int n = 0; n < most_deflection_steps; ++n) {
+    const int most = moves_ ? most_moving_steps : most_deflection_steps;
+    for (int n = 0; n < most; ++n) {
       std::array<S, N> step;
       for (std::size_t i = 0; i < N; ++i) step[i] = deflection_[i];
       if (loaded_ || moves_) turn_chain();
