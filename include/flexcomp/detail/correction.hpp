@@ -185,7 +185,7 @@ class Correction {
   void undo_constant_terms(std::array<S, N>& q) {
     take_nominal(q);
     region_ = singular_region(model_.tool_motion(), settings_);
-    solver_.set(nominal_point_, region_);
+    factor(nominal_point_);
     if (rate_ != nullptr) solver_.motion_by(rate_->command, rate_->target);
     SmallMotion<S> move;
     constant_twist(model_, angle_, move);
@@ -235,7 +235,7 @@ class Correction {
 
   /// Effects at the readings q: deflections (all but the own ones) and, where there are such, motions of links, base and
   /// tool. `angle_` belongs to q. At the first chain q is still psi: the readings are off by the deflection of the loads.
-  void evaluate(const std::array<S, N>& q, bool at_chain) {
+  FLEXCOMP_ONCE void evaluate(const std::array<S, N>& q, bool at_chain) {
     LinkLoads<S, N> loads;
     if (loaded_) {
       compute_loads(model_, angle_, load_, loads);
@@ -272,6 +272,11 @@ class Correction {
     }
   }
 
+  /// Factors the Jacobian of solver_.joints() at the tool point.
+  void factor(const Vec3<S>& tool) {
+    if (!solver_.set(tool, region_)) solver_.set_damped(region_);
+  }
+
   /// Turns the chain's joints, psi, until the flange is at the target (C5, C6): corrections `first` to `last`. q
   /// takes the same turns.
   void solve_chain(std::array<S, N>& q, int first, int last) {
@@ -290,7 +295,7 @@ class Correction {
       // from there on the Jacobian of this chain is used, which is close to that of the solution.
       if (!fresh_ && (solver_.is_damped() || solver_.jacobian_is_stale(turned_))) {
         solver_.joints() = joints_;
-        solver_.set(point, region_);
+        factor(point);
         fresh_ = true;
         turned_ = S(0);
       }

@@ -140,8 +140,9 @@ class DampedJacobianSolver {
   /// Axes and origins of the joints of the pose, in F0 (m): filled in before set(), which overwrites them.
   std::array<JointAxis<S>, N>& joints() { return column_; }
 
-  /// Factors the Jacobian at the tool point, in F0, m. Work: one pass over the joints, two 3x3 inverses.
-  void set(const Vec3<S>& tool, const SingularRegion<S>& region) {
+  /// Factors the Jacobian at the tool point, in F0, m. False where an eigenvalue may be below its threshold: set_damped()
+  /// has to follow. Work: one pass over the joints, two 3x3 inverses.
+  FLEXCOMP_ONCE bool set(const Vec3<S>& tool, const SingularRegion<S>& region) {
     Symmetric<S> block;
     {
       const S tx = tool.x, ty = tool.y, tz = tool.z;
@@ -223,11 +224,35 @@ class DampedJacobianSolver {
     regular_ = of_position < of_orientation ? of_position : of_orientation;
     if (!(regular_ < S(1))) regular_ = S(1);
     // W is at most 1 + l^2 tr(G G^T), and the trace at most that of Q P^-1 Q^T over the least eigenvalue of P: N / kappa of P.
-    if (!(of_position >= region.position &&
-          of_orientation * of_position >=
-              region.orientation * (of_position + S(static_cast<int>(N)) * region.length_squared))) {
-      set_damped(region);
+    return of_position >= region.position &&
+           of_orientation * of_position >=
+               region.orientation * (of_position + S(static_cast<int>(N)) * region.length_squared);
+  }
+
+  /// The factorisation of set() again, with damping (C9) where an eigenvalue is below its threshold.
+  FLEXCOMP_RARE void set_damped(const SingularRegion<S>& region) {
+    Symmetric<S> p{}, m{};
+    Vec3<S> q[3] = {};
+    for (const JointAxis<S>& c : column_) {
+      add_outer(c.origin, p);
+      add_outer(c.axis, m);
+      q[0] = q[0] + c.origin * c.axis.x;
+      q[1] = q[1] + c.origin * c.axis.y;
+      q[2] = q[2] + c.origin * c.axis.z;
     }
+    Symmetric<S> w = {S(1), S(1), S(1), S(0), S(0), S(0)};
+    if (damped_inverse(p, w, region.position, position_)) damped_ = true;
+    Vec3<S> g[3];
+    for (int r = 0; r < 3; ++r) {
+      g[r] = position_ * q[r];
+      gain_[3 * r] = g[r].x, gain_[3 * r + 1] = g[r].y, gain_[3 * r + 2] = g[r].z;
+    }
+    const S l = region.length_squared;
+    m.xx -= dot(g[0], q[0]), m.yy -= dot(g[1], q[1]), m.zz -= dot(g[2], q[2]);
+    m.xy -= dot(g[0], q[1]), m.xz -= dot(g[0], q[2]), m.yz -= dot(g[1], q[2]);
+    w.xx += l * dot(g[0], g[0]), w.yy += l * dot(g[1], g[1]), w.zz += l * dot(g[2], g[2]);
+    w.xy += l * dot(g[0], g[1]), w.xz += l * dot(g[0], g[2]), w.yz += l * dot(g[1], g[2]);
+    if (damped_inverse(m, w, region.orientation, orientation_)) damped_ = true;
   }
 
   /// Motion of tool point (m) and flange (rad) by joint turns, to first order: J dq.
@@ -299,32 +324,6 @@ class DampedJacobianSolver {
     const S det = determinant(a, b);
     inverse = b.over(det);
     return trace > S(0) && det > S(0) ? det / trace : S(0);
-  }
-
-  /// The factorisation again from column_, with damping (C9) where an eigenvalue is below its threshold.
-  FLEXCOMP_RARE void set_damped(const SingularRegion<S>& region) {
-    Symmetric<S> p{}, m{};
-    Vec3<S> q[3] = {};
-    for (const JointAxis<S>& c : column_) {
-      add_outer(c.origin, p);
-      add_outer(c.axis, m);
-      q[0] = q[0] + c.origin * c.axis.x;
-      q[1] = q[1] + c.origin * c.axis.y;
-      q[2] = q[2] + c.origin * c.axis.z;
-    }
-    Symmetric<S> w = {S(1), S(1), S(1), S(0), S(0), S(0)};
-    if (damped_inverse(p, w, region.position, position_)) damped_ = true;
-    Vec3<S> g[3];
-    for (int r = 0; r < 3; ++r) {
-      g[r] = position_ * q[r];
-      gain_[3 * r] = g[r].x, gain_[3 * r + 1] = g[r].y, gain_[3 * r + 2] = g[r].z;
-    }
-    const S l = region.length_squared;
-    m.xx -= dot(g[0], q[0]), m.yy -= dot(g[1], q[1]), m.zz -= dot(g[2], q[2]);
-    m.xy -= dot(g[0], q[1]), m.xz -= dot(g[0], q[2]), m.yz -= dot(g[1], q[2]);
-    w.xx += l * dot(g[0], g[0]), w.yy += l * dot(g[1], g[1]), w.zz += l * dot(g[2], g[2]);
-    w.xy += l * dot(g[0], g[1]), w.xz += l * dot(g[0], g[2]), w.yz += l * dot(g[1], g[2]);
-    if (damped_inverse(m, w, region.orientation, orientation_)) damped_ = true;
   }
 
   FLEXCOMP_RARE S solve_limited(const Vec3<S>& u, const Vec3<S>& v, const Vec3<S>& w, S largest,

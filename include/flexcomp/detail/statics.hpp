@@ -163,6 +163,15 @@ inline S lever_in_link_frame(const Model<S, N, Cap>& model, const std::array<Sin
   return (x * g.y - y * g.x) * model.plan().inverse_gravity() / sqrt(square);
 }
 
+/// Adds the torques and moments of the external force.
+template <class S, std::size_t N, class Cap>
+FLEXCOMP_ONCE void add_force(const Model<S, N, Cap>& model, const std::array<SinCos<S>, N>& angle,
+                             const StaticLoad<S>& load, LinkLoads<S, N>& out) {
+  LinkLoads<S, N> of_force;
+  propagate_statics(model.shapes(), angle, load.force_n, vec3<S>(model.tool_pose().position), of_force);
+  out.add(of_force);
+}
+
 /// Loads of one instant (C12) for the readings whose sines and cosines are in `angle`: gravity's field and, in N·m, the
 /// torques and moments of payload and external force.
 template <class S, std::size_t N, class Cap>
@@ -179,10 +188,7 @@ FLEXCOMP_ONCE void compute_loads(const Model<S, N, Cap>& model, const std::array
     out.base_moment_x *= mass;
     out.base_moment_y *= mass;
   }
-  if (!load.has_force) return;
-  LinkLoads<S, N> of_force;
-  propagate_statics(model.shapes(), angle, load.force_n, vec3<S>(model.tool_pose().position), of_force);
-  out.add(of_force);
+  if (load.has_force) add_force(model, angle, load, out);
 }
 
 /// Adds the deflections by link weight (M14), rad; lever(joint, distal) gives a lever (M13).
