@@ -3,6 +3,8 @@
 
 #include <limits>
 
+#include "flexcomp_firmware/arithmetic.hpp"
+
 #include "firmware/bench.hpp"
 
 namespace flexcomp::firmware::bench {
