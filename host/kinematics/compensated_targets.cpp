@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "flexcomp/compensate.hpp"
+#include "flexcomp/arm_state.hpp"
 #include "flexcomp/image.hpp"
 #include "flexcomp/model.hpp"
 #include "input_error.hpp"
@@ -27,9 +27,9 @@ std::vector<Answer> compensated(const TargetsFile& targets,
     const auto& context = targets.rows[k].context;
     const auto result = compensate(*model, commands[k], context, CompensationSettings<double>{});
     // Of a command that is passed through the controller says nothing, and 0 on the wire.
-    TargetResidual<double> residual;
+    RemainingError<double> residual{};
     if (result.status != StepStatus::refused) {
-      residual = target_residual(*model, result.q, commands[k], context);
+      residual = remaining_error(*model, result.q, commands[k], context);
     }
     answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status});
   }
