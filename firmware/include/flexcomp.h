@@ -376,7 +376,7 @@ uint32_t flexcomp_step_flags(const flexcomp_arm* fc);
  * cycle_us. 0 where the output stands. Always finite; where a rate of the command is not finite, all count as 0.
  * One call takes the place of flexcomp_step in a cycle; the two may alternate.
  *
- * CYCLE: as flexcomp_step; twice its work at most. */
+ * CYCLE: as flexcomp_step; some three times its work. */
 flexcomp_status flexcomp_step_rate(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
                                    const flexcomp_real q_rate_command_rad_s[FLEXCOMP_JOINTS],
                                    const flexcomp_context* context,
