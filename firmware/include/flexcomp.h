@@ -12,8 +12,15 @@
  *     flexcomp_poll(fc, now_ms);                                     5. BACKGROUND: every 10 ms or so
  *     flexcomp_can_receive(can, id, bytes, size);                    6. BACKGROUND: frames of a bus
  *
+ * In place of 4, where the drives take feed-forward: flexcomp_step_rate, with the corrected velocity. In place of
+ * 6, where a fieldbus of yours or a file brings the sets: flexcomp_stage_begin, _write, _verify, _commit. Beside
+ * them: flexcomp_uncorrect (encoders to command, for start, jogging, display), flexcomp_tool_pose and
+ * flexcomp_joint_loads; flexcomp_get_diagnostics after a step; flexcomp_set_hooks, by which the program permits
+ * or refuses commands of the buses and writes a log.
+ *
  * `robot` is a constant that `flexcomp export` writes, `storage` three functions for two slots of flash.
- * firmware/examples has whole controllers, docs/firmware.md the steps one by one.
+ * firmware/examples has whole controllers (minimal_controller.c; two_arms.c with two arms; servo_loop.c with
+ * feed-forward), docs/firmware.md the steps one by one.
  *
  * How it works. The control cycle gives a joint command and gets back the command at which the flexible arm
  * has the pose that the nominal arm would have (docs/compensation.md). Parameter sets arrive over CANopen or
@@ -24,10 +31,11 @@
  * in use from the init that was given it for as long as any call names the object; another init reuses it,
  * and there is nothing to release.
  *
- * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step,
- * with flexcomp_step_flags, and flexcomp_start where it begins anew, and nothing else; it may interrupt the
- * other one at any point and never waits. The BACKGROUND context (main loop, or one thread) calls everything
- * else; two calls of it must not overlap. Hooks are called in the background, from within the call that needs
+ * Threads. Two contexts. The CYCLE context (a timer interrupt or a real-time thread) calls flexcomp_step or
+ * flexcomp_step_rate, with flexcomp_step_flags and flexcomp_get_diagnostics, and flexcomp_start where it begins
+ * anew; it may interrupt the other one at any point and never waits. The BACKGROUND context (main loop, or one
+ * thread) calls everything else; two calls of it must not overlap. A call for BOTH contexts may run in both at
+ * the same time. Hooks are called in the background, from within the call that needs
  * them; they must not call back into the library. Two arms share nothing: each has a cycle and a background
  * of its own. A call for ANY context touches nothing but its arguments.
  *
@@ -35,6 +43,7 @@
  * bound stands with each call, in these measures:
  *   small   a few thousand instructions at most
  *   a step  as flexcomp_step: a fixed number of passes over six links and at most FLEXCOMP_TERMS effects
+ *   a pass  the forward model once: less than a step
  *   a check of an image of n bytes: its CRC, its terms and tables, and the motion of the tool in 32 poses; of
  *           the order of ten steps, and some ten instructions per byte
  * and in addition the time of the hooks that it calls. docs/targets.md has the measured figures of time,
@@ -73,7 +82,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
   (400 * sizeof(flexcomp_real) + FLEXCOMP_TERMS * (20 + 2 * sizeof(flexcomp_real)) + FLEXCOMP_TABLES * 12 + \
    FLEXCOMP_TABLE_VALUES * sizeof(flexcomp_real))
 /** Memory of one arm: staging, two sets, and the rest. */
-#define FLEXCOMP_MEMORY_BYTES (3840 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
+#define FLEXCOMP_MEMORY_BYTES (4032 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
 /** Memory of one CANopen node. */
 #define FLEXCOMP_CAN_BYTES 1088
 /** Memory of one Modbus serial line. */
@@ -151,7 +160,6 @@ typedef enum flexcomp_on_refusal {
   FLEXCOMP_HOLD_LAST_OUTPUT = 1 /**< the last output stands */
 } flexcomp_on_refusal;
 
-/** Settings of an arm. */
 /** Greatest bounds of a set (docs/compensation.md, section "Admission"); a set beyond them is refused. For each joint, and
  * for links, base and tool together with lengths divided by the arm's reach. */
 typedef struct flexcomp_admission {
@@ -172,9 +180,14 @@ typedef struct flexcomp_admission {
   flexcomp_real temperature_k; /**< greatest distance from the reference; negative: 30 K */
 } flexcomp_admission;
 
-/** Settings of an arm. */
+/** Settings of an arm. flexcomp_settings_default() first, then what is to be different: flexcomp_init refuses
+ * settings that do not begin with the size that it sets. */
 typedef struct flexcomp_settings {
-  flexcomp_real largest_correction_rad;    /**< of any joint */
+  uint32_t struct_size;                 /**< sizeof(flexcomp_settings); set by flexcomp_settings_default */
+  flexcomp_real largest_correction_rad; /**< of any joint */
+  /** Greatest slope of the correction over the command near singularities (docs/compensation.md, C9), above 0 and
+   * at most 200: a larger one leaves less error there and moves the joints faster. */
+  flexcomp_real steepest;
   flexcomp_real direction_band_rad;        /**< motion after which a joint counts as reversed */
   flexcomp_real plausible_position_m;      /**< a set that moves the tool farther is refused */
   flexcomp_real plausible_orientation_rad; /**< the same for its orientation, below pi / 2 */
@@ -191,8 +204,8 @@ typedef struct flexcomp_settings {
   flexcomp_admission admission;             /**< bounds beyond which a set is refused */
 } flexcomp_settings;
 
-/** Sets the defaults: 0.1 rad, 1e-4 rad, 0.05 m, 0.1 rad, 2 rad/s, 0.5 rad/s, 20 rad/s^2, 60000, 30000 ms,
- * 1000 us, FLEXCOMP_HOLD_LAST_OUTPUT; admission as in docs/compensation.md. ANY context; small. */
+/** Sets the size and the defaults: 0.1 rad, slope 100, 1e-4 rad, 0.05 m, 0.1 rad, 2 rad/s, 0.5 rad/s, 20 rad/s^2,
+ * 60000, 30000 ms, 1000 us, FLEXCOMP_HOLD_LAST_OUTPUT; admission as in docs/compensation.md. ANY context; small. */
 void flexcomp_settings_default(flexcomp_settings* settings);
 
 /* --- non-volatile memory ------------------------------------------------------------------------- */
@@ -221,13 +234,84 @@ typedef struct flexcomp_storage {
 
 /* --- one arm ------------------------------------------------------------------------------------- */
 
-/** Builds an arm in `memory`. `settings` and `storage` may be NULL: defaults, and no non-volatile memory. All
- * is copied. NULL where the memory is too small or misaligned, or the robot is not valid: a number that is
- * not finite, crossed limits, a quaternion off norm 1 by more than 1e-3, no name; or a period, a rate or an
- * acceleration of the settings is not above 0. BACKGROUND, before the cycle starts; the hashes of robot and
- * name, and clearing the memory: a few instructions per byte of it. No hook. */
-flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
-                            const flexcomp_settings* settings, const flexcomp_storage* storage);
+/** Why an init gave NULL. Numbers are added to, never changed. */
+typedef enum flexcomp_init_error {
+  FLEXCOMP_INIT_DONE = 0,   /**< it did not */
+  FLEXCOMP_INIT_MEMORY = 1, /**< missing, too small or misaligned */
+  /** A number that is not finite, crossed limits, a quaternion off norm 1 by more than 1e-3, or no name. */
+  FLEXCOMP_INIT_ROBOT = 2,
+  /** A period, rate, acceleration or slope that is not above 0, a slope above 200, or another struct_size. */
+  FLEXCOMP_INIT_SETTINGS = 3,
+  FLEXCOMP_INIT_OTHER_SCALAR = 4,   /**< FLEXCOMP_SCALAR of program and library differ */
+  FLEXCOMP_INIT_OTHER_CAPACITY = 5, /**< another value of flexcomp_config.h differs */
+  FLEXCOMP_INIT_OTHER_STRUCTS = 6   /**< versions of flexcomp.h, or their layouts, differ */
+} flexcomp_init_error;
+
+/** flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
+ *     const flexcomp_settings* settings, const flexcomp_storage* storage)
+ *
+ * Builds an arm in `memory`. `settings` and `storage` may be NULL: defaults, and no non-volatile memory. All
+ * is copied. NULL for any reason of flexcomp_init_error, which flexcomp_init_explained tells. A macro, because
+ * what the program was compiled with has to be that of the library: a program with another scalar, other
+ * capacities or another version of this header gets NULL. BACKGROUND, before the cycle starts; the hashes of
+ * robot and name, and clearing the memory: a few instructions per byte of it. No hook. */
+#define flexcomp_init(memory, size, robot, settings, storage) \
+  flexcomp_init_checked(memory, size, robot, settings, storage, NULL, FLEXCOMP_BUILD_)
+
+/** flexcomp_init() that sets *error (unsigned) to a number of flexcomp_init_error. */
+#define flexcomp_init_explained(memory, size, robot, settings, storage, error) \
+  flexcomp_init_checked(memory, size, robot, settings, storage, error, FLEXCOMP_BUILD_)
+
+/** What program and library have to agree on; for flexcomp_init. */
+#define FLEXCOMP_BUILD_                                                                              \
+  sizeof(flexcomp_real), FLEXCOMP_JOINTS, FLEXCOMP_TERMS, FLEXCOMP_TABLES, FLEXCOMP_TABLE_VALUES,    \
+      FLEXCOMP_STAGING_BYTES,                                                                        \
+      sizeof(flexcomp_robot) + 3 * sizeof(flexcomp_settings) + 5 * sizeof(flexcomp_context) +        \
+          7 * sizeof(flexcomp_storage) + 11 * sizeof(flexcomp_state) + 13 * sizeof(flexcomp_hooks) + \
+          17 * sizeof(flexcomp_diagnostics)
+
+/** What flexcomp_init calls, with the sizes of the caller's compile. `error` may be NULL. Not for calls by hand. */
+flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_robot* robot,
+                                    const flexcomp_settings* settings, const flexcomp_storage* storage,
+                                    unsigned* error, size_t real_bytes, size_t joints, size_t terms,
+                                    size_t tables, size_t table_values, size_t staging_bytes,
+                                    size_t struct_bytes);
+
+/** Text of a flexcomp_init_error in English, lower case, without a full stop; any number is answered. ANY
+ * context; small. */
+const char* flexcomp_init_error_text(unsigned error);
+
+/** What the hook `log` is told. Numbers are added to, never changed. */
+typedef enum flexcomp_event {
+  FLEXCOMP_EVENT_BOOTED = 1, /**< the start has loaded what there is; detail: fault bits of flexcomp_state */
+  FLEXCOMP_EVENT_IMAGE_REFUSED = 2,   /**< by verification or at the start; detail: flexcomp_refusal_text */
+  FLEXCOMP_EVENT_ACTIVATED = 3,       /**< a committed set; detail: its sequence */
+  FLEXCOMP_EVENT_TRIAL_BEGUN = 4,     /**< detail: sequence of the set on trial */
+  FLEXCOMP_EVENT_TRIAL_CONFIRMED = 5, /**< it is permanent now; detail: its sequence */
+  /** It ran out, or could not be made permanent; detail: sequence of the set that is active again, 0: none. */
+  FLEXCOMP_EVENT_TRIAL_REVERTED = 6,
+  FLEXCOMP_EVENT_ROLLED_BACK = 7, /**< by command; detail: sequence of the set that is active then, 0: none */
+  FLEXCOMP_EVENT_RESTORED = 8,    /**< both slots are erased; detail: 0 */
+  FLEXCOMP_EVENT_STORAGE_FAILED = 9, /**< detail: the last accepted command, 0 at the start */
+  FLEXCOMP_EVENT_NOT_AUTHORISED = 10 /**< `permit` refused; detail: the command */
+} flexcomp_event;
+
+/** What the program decides and is told of. Either hook may be NULL. Called in the background, from within the
+ * call in which it happens; they must not call back into the library. */
+typedef struct flexcomp_hooks {
+  void* user; /**< given to both */
+  /** Nonzero where this command of the parameter store is allowed now; otherwise it is answered
+   * `not_authorised` (4) and nothing happens. `command` is a FLEXCOMP_COMMAND_ number. `is_local`: not from a bus,
+   * but by flexcomp_command or a flexcomp_stage_ call. Asked for every command of every bus; a program may, for
+   * example, refuse commit, rollback and restore while the drives move. NULL: all are allowed. */
+  unsigned (*permit)(void* user, unsigned command, unsigned is_local);
+  /** Told of a flexcomp_event with its detail. */
+  void (*log)(void* user, unsigned event, uint32_t detail);
+} flexcomp_hooks;
+
+/** Who is asked and told from now on; copied. NULL: nobody. Before flexcomp_boot to hear of the start.
+ * BACKGROUND; small. */
+void flexcomp_set_hooks(flexcomp_arm* fc, const flexcomp_hooks* hooks);
 
 /** Loads the set from storage: the highest valid sequence, else the other one, else none. Once, before the
  * cycle starts. Returns the fault bits of flexcomp_state. BACKGROUND; four calls of `read`, and two images'
@@ -303,6 +387,72 @@ typedef enum flexcomp_step_flag {
  * and the status FLEXCOMP_OK. BOTH contexts; small. */
 uint32_t flexcomp_step_flags(const flexcomp_arm* fc);
 
+/** flexcomp_step() with velocities (rad/s) for the feed-forward of the drives (docs/compensation.md, C22): the rate
+ * of the command in, the rate of the corrected command out; arrays may be shared.
+ *
+ * Where nothing holds back it is the analytic derivative, context and set standing still, and while an event
+ * settles that and the motion of its offset. In every cycle in which anything else holds back (rate_limited,
+ * at_limit, limited, near_singular, not_converged, no_set), in which an event begins or a tracked direction turns,
+ * it is what was really put out: the command's rate and the change of the correction since the last cycle over
+ * cycle_us. 0 where the output stands. Always finite; where a rate of the command is not finite, all count as 0.
+ * One call takes the place of flexcomp_step in a cycle; the two may alternate.
+ *
+ * CYCLE: as flexcomp_step; some three times its work. */
+flexcomp_status flexcomp_step_rate(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
+                                   const flexcomp_real q_rate_command_rad_s[FLEXCOMP_JOINTS],
+                                   const flexcomp_context* context,
+                                   flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS],
+                                   flexcomp_real q_rate_corrected_rad_s[FLEXCOMP_JOINTS]);
+
+/** What the last step did. */
+typedef struct flexcomp_diagnostics {
+  uint32_t struct_size;               /**< in: sizeof(flexcomp_diagnostics) */
+  uint32_t cycles;                    /**< since the start; wraps */
+  uint32_t cycles_by_status[6];       /**< the same by flexcomp_status; wrap */
+  flexcomp_status status;             /**< of the last step */
+  uint32_t flags;                     /**< of the last step, bits of flexcomp_step_flag */
+  flexcomp_real remaining_position_m; /**< error of the tool that its last iterate leaves; 0 without a set */
+  flexcomp_real remaining_orientation_rad;       /**< the same of its orientation */
+  flexcomp_real correction_rad[FLEXCOMP_JOINTS]; /**< output less command */
+  flexcomp_real offset_rad[FLEXCOMP_JOINTS];     /**< the part of it that an event left; exactly 0 without */
+  flexcomp_real direction[FLEXCOMP_JOINTS]; /**< of motion as tracked, -1 ... 1; 0 until a joint has moved */
+} flexcomp_diagnostics;
+
+/** Fills the diagnostics of the last step. 0, and nothing is written, where struct_size is not
+ * sizeof(flexcomp_diagnostics). The remaining errors are those of the set's answer: offset and rate come on top.
+ * CYCLE, after the step; small. */
+int flexcomp_get_diagnostics(const flexcomp_arm* fc, flexcomp_diagnostics* diagnostics);
+
+/* --- at joint readings ----------------------------------------------------------------------------
+ * Three calls on the set in use, with the directions of motion as the step tracks them. BOTH contexts, also at the
+ * same time, and before the first step: they use the set that the cycle uses, or will with its next step, and
+ * change nothing. In the background that set stays what it is until the next poll or command. `context` may be
+ * NULL: the default one. No hook. */
+
+/** Nominal command for joint readings (docs/compensation.md, C21): that which the active set corrects to
+ * q_reading_rad. For the start, jogging, display and the following error; an offset that settles is not in it.
+ * Nonzero where it is accurate to 1e-10 rad (float: 2e-6). 0, and the command as far as it came, where a number is
+ * not finite (the reading comes back), beyond a joint limit, inside a singular region, or where the step would limit
+ * the correction. Without a set the readings themselves. BOTH contexts; some six steps, 16 at most. In a cycle that
+ * has no time for them: in the background. */
+int flexcomp_uncorrect(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                       const flexcomp_context* context, flexcomp_real q_command_rad[FLEXCOMP_JOINTS]);
+
+/** True pose of the tool frame in F0 at joint readings, by the forward model with all effects (docs/model.md, M15):
+ * origin, and Hamilton quaternion (w, x, y, z) with w >= 0. 0, and nothing is written, without a set or where a
+ * number is not finite. BOTH contexts; a pass. */
+int flexcomp_tool_pose(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                       const flexcomp_context* context, flexcomp_real xyz_m[3], flexcomp_real wxyz[4]);
+
+/** What loads do to the joints at their readings: torque about each joint by payload and external force, the
+ * links' weight left out (docs/model.md, M11), and the angle by which all effects but constant ones turn it. 0, and
+ * nothing is written, without a set or where a number is not finite. BOTH contexts; a pass. */
+int flexcomp_joint_loads(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                         const flexcomp_context* context, flexcomp_real torque_nm[FLEXCOMP_JOINTS],
+                         flexcomp_real deflection_rad[FLEXCOMP_JOINTS]);
+
+/* --- the parameter store -------------------------------------------------------------------------- */
+
 /** Background work of the store: checking and writing a set, trials, timeouts. Every 10 ms or so; the check of a
  * set takes 50 to 150 polls, a commit of n bytes n / 256 + 3 more. now_ms is any clock that wraps at 32 bits.
  * BACKGROUND; at most 20,000 instructions of a Cortex-M7 (default capacity) while a set is checked, else small, and
@@ -326,15 +476,54 @@ typedef struct flexcomp_state {
 /** Copies the state. BACKGROUND; small. */
 void flexcomp_get_state(const flexcomp_arm* fc, flexcomp_state* state);
 
+/** Command as the hook `permit` sees it: a transfer begins. */
+#define FLEXCOMP_COMMAND_BEGIN 1
+/** Command as the hook `permit` sees it: checks what is staged. */
+#define FLEXCOMP_COMMAND_VERIFY 2
+/** Command as the hook `permit` sees it: writes what is staged to a slot and activates it. */
+#define FLEXCOMP_COMMAND_COMMIT 3
+/** Command as the hook `permit` sees it: the same on trial. */
+#define FLEXCOMP_COMMAND_COMMIT_TRIAL 4
 /** Command of flexcomp_command(): makes the set on trial permanent. */
 #define FLEXCOMP_COMMAND_CONFIRM 5
 /** Command of flexcomp_command(): back to the set in the other slot, or out of the trial. */
 #define FLEXCOMP_COMMAND_ROLLBACK 6
+/** Command as the hook `permit` sees it: discards what is staged. */
+#define FLEXCOMP_COMMAND_ABORT 7
 /** Command of flexcomp_command(): erases both slots; commands are then passed through. */
 #define FLEXCOMP_COMMAND_RESTORE_DEFAULTS 8
 /** A command from local control (an operator panel), numbers as on the wire. Returns the answer; the polls
  * that follow do the work. BACKGROUND; small, but for a rollback one `read` of an image and its check. */
 unsigned flexcomp_command(flexcomp_arm* fc, unsigned command);
+
+/* A set by bytes, for a fieldbus of the program's own (EtherCAT, PROFINET), a file or a panel. It is the same store
+ * with the same checks as behind the buses; while one client stages, the others are told that it is busy. Answers
+ * are those of the wire (flexcomp_answer_text): 0 accepted, 1 refused (flexcomp_state says why), others. All
+ * BACKGROUND.
+ *
+ *     flexcomp_stage_begin(fc, size);
+ *     flexcomp_stage_write(fc, 0, image, size);      once or in portions
+ *     flexcomp_stage_verify(fc);                     may be left out: commit verifies as well
+ *     flexcomp_stage_commit(fc);
+ *
+ * Verify and commit may answer before they have ended. After either, call flexcomp_poll until `store` of
+ * flexcomp_state is no longer 3 (working); `answer`, `refusal` and `detail` then tell how it ended. */
+
+/** Announces an image of `bytes`; what was staged before is dropped. Small, and clears FLEXCOMP_STAGING_BYTES. */
+unsigned flexcomp_stage_begin(flexcomp_arm* fc, uint32_t bytes);
+/** Bytes of the image from `offset`; portions may overlap what came before but leave no gap. Copies them: some
+ * instructions per byte. */
+unsigned flexcomp_stage_write(flexcomp_arm* fc, uint32_t offset, const uint8_t* bytes, uint32_t size);
+/** Checks the image and prepares it. A check of the image, in this call or in the polls that follow. */
+unsigned flexcomp_stage_verify(flexcomp_arm* fc);
+/** Writes the image to the other slot and activates it, verified before where it was not. The polls do the work.
+ * As flexcomp_stage_verify. */
+unsigned flexcomp_stage_commit(flexcomp_arm* fc);
+/** The same on trial: after so many control cycles (0: as trial_cycles says) the former set is active again unless
+ * flexcomp_command(fc, FLEXCOMP_COMMAND_CONFIRM) comes before. */
+unsigned flexcomp_stage_commit_trial(flexcomp_arm* fc, uint32_t cycles);
+/** Discards what is staged. Small. */
+unsigned flexcomp_stage_abort(flexcomp_arm* fc);
 
 /** Name of a status as in files, lower case; any number is answered. ANY context; small. */
 const char* flexcomp_status_text(flexcomp_status status);

@@ -204,9 +204,9 @@ std::uint32_t CanopenNode::accept(std::uint32_t size, bool known) {
   if (entry == nullptr) return code;
   if (entry->access == Access::ro) return co::abort::read_only;
   if (staging()) {
-    if (!known) return code_of(device_.store().begin_unknown(origin_));
+    if (!known) return code_of(device_.begin_unknown(origin_));
     if (size == 0) return co::abort::too_short;
-    return code_of(device_.store().run(wire::Command::begin, size, origin_));
+    return code_of(device_.run(wire::Command::begin, size, origin_));
   }
   if (known && size > entry->size) return co::abort::too_long;
   if (known && size < entry->size) return co::abort::too_short;
@@ -379,7 +379,7 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
 // --- objects ------------------------------------------------------------------------------------------
 
 std::uint32_t CanopenNode::command(wire::Command command, std::uint32_t argument) {
-  return code_of(device_.store().run(command, argument, origin_));
+  return code_of(device_.run(command, argument, origin_));
 }
 
 /// Writes the selected object; the size has been checked.

@@ -119,7 +119,7 @@ bool ControlCycle::context_jumped(const FirmwareContext& context) {
   return !(motion <= output_.motion_change_most());
 }
 
-void ControlCycle::publish(const StepResult& out) {
+void ControlCycle::publish(const StepResult& out, const FirmwareModel* model) {
   count(publication_.cycles);
   count(publication_.cycles_by_status[static_cast<std::size_t>(out.status)]);
   publication_.last_status.store(static_cast<std::uint32_t>(out.status), std::memory_order_relaxed);
@@ -132,22 +132,17 @@ void ControlCycle::publish(const StepResult& out) {
     if (magnitude > largest) largest = magnitude;
   }
   largest_ = largest;
+  // Not in a function of its own: GCC 12.2 drops a call to one that makes nothing but atomic stores.
+  if (model != nullptr && model->reads_direction()) {
+    for (std::size_t j = 0; j < joints; ++j)
+      publication_.direction[j].store(float_bits(static_cast<float>(direction_[j])),
+                                      std::memory_order_relaxed);
+  }
   publication_.largest_correction_rad.store(float_bits(static_cast<float>(largest_)),
                                             std::memory_order_relaxed);
 }
 
-void ControlCycle::correct(const FirmwareModel& model, const Joints& q_command_rad,
-                           const FirmwareContext& context, StepResult& out) const {
-  if (!model.reads_direction()) {
-    corrected_command(model, q_command_rad, context, settings_.compensation, out);
-    return;
-  }
-  FirmwareContext tracked = context;
-  tracked.direction = direction_;
-  corrected_command(model, q_command_rad, tracked, settings_.compensation, out);
-}
-
-void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
+ControlCycle::Input ControlCycle::begin(const Joints& q_command_rad) {
   bool changed = false;
   const std::uint32_t index = sets_.handover.take(changed);
   if (changed) {
@@ -158,25 +153,33 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
   command.add(q_command_rad);
   const bool is_finite_command = command.passed();
   if (is_finite_command) track(q_command_rad);
-  if (is_finite_command && index != Handover::none) {
-    correct(sets_.models[index], q_command_rad, context, out);
-  } else {
+  return {index != Handover::none ? &sets_.models[index] : nullptr, is_finite_command};
+}
+
+// What comes behind the set's answer in `out`; true at an event.
+bool ControlCycle::finish(const Input& input, const Joints& q_command_rad, const FirmwareContext& context,
+                          StepResult& out) {
+  const bool has_set = input.model != nullptr;
+  if (!input.is_finite || !has_set) {
     out.q = q_command_rad;
     out.remaining_position_m = out.remaining_orientation_rad = Scalar(0);
-    out.flags = index == Handover::none ? step_flag::no_set : std::uint16_t{0};
-    if (!is_finite_command || !is_within_limits(q_command_rad)) out.flags |= step_flag::refused;
+    out.flags = has_set ? std::uint16_t{0} : step_flag::no_set;
+    if (!input.is_finite || !is_within_limits(q_command_rad)) out.flags |= step_flag::refused;
   }
+  remaining_position_ = out.remaining_position_m;
+  remaining_orientation_ = out.remaining_orientation_rad;
 
   bool jumped = false;
   bool is_used = true;
   if ((out.flags & step_flag::refused) != 0) {
     is_used = settings_.on_refusal == OnRefusal::pass_through && is_within_limits(q_command_rad);
-  } else if (index != Handover::none) {
+  } else if (has_set) {
     jumped = context_jumped(context);
   }
+  bool event = false;
   if (is_used) {
     const std::uint16_t cause = out.flags & event_flags;
-    const bool event = jumped || is_new_set_ || cause != last_cause_;
+    event = jumped || is_new_set_ || cause != last_cause_;
     last_cause_ = cause;
     is_new_set_ = false;
     const Joints wanted = out.q;
@@ -194,7 +197,84 @@ void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& cont
     output_.hold(q_command_rad, out.q);
   }
   out.status = summary(out.flags);
-  publish(out);
+  publish(out, input.model);
+  return event;
+}
+
+void ControlCycle::step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out) {
+  const Input input = begin(q_command_rad);
+  if (input.is_finite && input.model != nullptr) {
+    if (input.model->reads_direction()) {
+      FirmwareContext tracked = context;
+      tracked.direction = direction_;
+      corrected_command(*input.model, q_command_rad, tracked, settings_.compensation, out);
+    } else {
+      corrected_command(*input.model, q_command_rad, context, settings_.compensation, out);
+    }
+  }
+  finish(input, q_command_rad, context, out);
+}
+
+void ControlCycle::step_rate(const Joints& q_command_rad, const Joints& q_rate_command_rad_s,
+                             const FirmwareContext& context, StepResult& out, Joints& q_rate_rad_s) {
+  const Joints direction_before = direction_;
+  const Joints correction_before = output_.correction();
+  const bool stood = output_.is_standing();
+  const Input input = begin(q_command_rad);
+  FiniteCheck<Scalar> check;
+  check.add(q_rate_command_rad_s);
+  Joints command_rate{};
+  if (check.passed()) command_rate = q_rate_command_rad_s;
+  q_rate_rad_s = command_rate;
+  bool is_derivative = true;
+  if (input.is_finite && input.model != nullptr) {
+    FirmwareContext tracked = context;
+    if (input.model->reads_direction()) {
+      tracked.direction = direction_;
+      // While a direction turns, the correction moves by more than the derivative at fixed directions.
+      is_derivative = direction_ == direction_before;
+    }
+    if (!corrected_rate(*input.model, q_command_rad, command_rate, tracked, settings_.compensation, out,
+                        q_rate_rad_s)) {
+      is_derivative = false;
+    }
+  } else {
+    is_derivative = false;
+  }
+  const bool event = finish(input, q_command_rad, context, out);
+
+  const std::uint32_t cycle_us = settings_.motion.cycle_us;
+  const Scalar per_cycle = Scalar(1e6F) / static_cast<Scalar>(cycle_us != 0 ? cycle_us : 1U);
+  constexpr std::uint16_t other = static_cast<std::uint16_t>(~step_flag::settling);
+  is_derivative = is_derivative && !event && (out.flags & other) == 0;
+  const bool stands = stood || output_.is_standing();
+  const bool is_refused = (out.flags & step_flag::refused) != 0 && settings_.on_refusal == OnRefusal::hold;
+  FiniteCheck<Scalar> result;
+  for (std::size_t j = 0; j < joints; ++j) {
+    Scalar rate = Scalar(0);
+    if (is_derivative) {
+      rate = q_rate_rad_s[j];
+      if ((out.flags & step_flag::settling) != 0) rate += output_.offset_motion()[j] * per_cycle;
+    } else {
+      rate = command_rate[j] + (output_.correction()[j] - correction_before[j]) * per_cycle;
+    }
+    if (stands || is_refused) rate = Scalar(0);
+    q_rate_rad_s[j] = rate;
+    result.add(rate);
+  }
+  if (!result.passed()) q_rate_rad_s = {};
+}
+
+const FirmwareModel* ControlCycle::current(FirmwareContext& context) const {
+  const std::uint32_t index = sets_.handover.readable();
+  if (index == Handover::none) return nullptr;
+  for (std::size_t j = 0; j < joints; ++j) {
+    const std::uint32_t bits = publication_.direction[j].load(std::memory_order_relaxed);
+    float direction;
+    std::memcpy(&direction, &bits, sizeof direction);
+    context.direction[j] = static_cast<Scalar>(direction);
+  }
+  return &sets_.models[index];
 }
 
 }  // namespace firmware

@@ -36,6 +36,103 @@ Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings&
   if (settings.name[name_size_] != 0) name_size_ = 0;
 }
 
+void Device::set_hooks(const DeviceHooks& hooks) {
+  hooks_ = hooks;
+  observe_ = nullptr;
+  if (hooks.log == nullptr) return;
+  hooks_.log = nullptr;
+  observe(*this);
+  hooks_.log = hooks.log;
+  observe_ = observe;
+}
+
+void Device::boot() {
+  store_.boot();
+  if (observe_ == nullptr) return;
+  const DeviceHooks hooks = hooks_;
+  hooks_.log = nullptr;
+  observe_(*this);
+  hooks_.log = hooks.log;
+  hooks.log(hooks.user, Event::booted, seen_.faults);
+  if (seen_.refusal != 0) hooks.log(hooks.user, Event::image_refused, seen_.refusal);
+}
+
+void Device::poll(std::uint32_t now_ms) {
+  wire::Status before;
+  if (denied_) store_.status(before);
+  store_.poll(now_ms);
+  if (denied_ && before.state == static_cast<std::uint16_t>(wire::StoreState::working)) {
+    // The end of the work is the answer to a command that came before the one that was not permitted.
+    store_.status(before);
+    denied_ = before.state == static_cast<std::uint16_t>(wire::StoreState::working);
+  }
+  if (observe_ != nullptr) observe_(*this);
+}
+
+bool Device::is_permitted(wire::Command command, Origin origin) {
+  denied_ = command != wire::Command::none && hooks_.permit != nullptr &&
+            !hooks_.permit(hooks_.user, command, origin);
+  if (denied_ && observe_ != nullptr)
+    hooks_.log(hooks_.user, Event::not_authorised, static_cast<std::uint32_t>(command));
+  if (denied_) return false;
+  // A command clears the refusal of the one before: the same one again is told again.
+  seen_.refusal = 0;
+  seen_.answer = 0;
+  return true;
+}
+
+wire::Answer Device::run(wire::Command command, std::uint32_t argument, Origin origin) {
+  if (!is_permitted(command, origin)) return wire::Answer::not_authorised;
+  const wire::Answer answer = store_.run(command, argument, origin);
+  if (answer == wire::Answer::accepted && command != wire::Command::none) seen_.command = command;
+  if (observe_ != nullptr) observe_(*this);
+  return answer;
+}
+
+wire::Answer Device::begin_unknown(Origin origin) {
+  if (!is_permitted(wire::Command::begin, origin)) return wire::Answer::not_authorised;
+  const wire::Answer answer = store_.begin_unknown(origin);
+  if (observe_ != nullptr) observe_(*this);
+  return answer;
+}
+
+// Tells what has changed in the store since the last call.
+void Device::observe(Device& device) {
+  constexpr auto working = static_cast<std::uint16_t>(wire::StoreState::working);
+  constexpr auto trial = static_cast<std::uint16_t>(wire::StoreState::trial);
+  constexpr auto failed = static_cast<std::uint16_t>(wire::Answer::storage_failed);
+  wire::Status now;
+  device.store_.status(now);
+  const Seen was = device.seen_;
+  device.seen_ = {now.state,           now.answer,     now.refusal, now.faults,
+                  now.active_sequence, now.active_crc, was.command};
+  const DeviceHooks& hooks = device.hooks_;
+  const auto tell = [&hooks](Event event, std::uint32_t detail) {
+    if (hooks.log != nullptr) hooks.log(hooks.user, event, detail);
+  };
+  const unsigned new_faults = now.faults & ~static_cast<unsigned>(was.faults);
+  if (now.refusal != 0 && now.refusal != was.refusal) tell(Event::image_refused, now.refusal);
+  if ((now.answer == failed && was.answer != failed) || (new_faults & wire::fault::storage) != 0)
+    tell(Event::storage_failed, static_cast<std::uint32_t>(was.command));
+
+  const bool is_other_set = now.active_sequence != was.sequence || now.active_crc != was.crc;
+  const bool has_ended = was.state == working && now.state != working && now.answer == 0;
+  const std::uint32_t sequence = now.active_sequence;
+  if ((new_faults & wire::fault::trial_reverted) != 0) {
+    tell(Event::trial_reverted, sequence);
+  } else if (is_other_set && now.state == trial && was.state != trial) {
+    tell(Event::trial_begun, sequence);
+  } else if (is_other_set || has_ended) {
+    if (was.command == wire::Command::restore_defaults) {
+      tell(Event::restored, sequence);
+    } else if (was.command == wire::Command::confirm) {
+      tell(is_other_set ? Event::trial_reverted : Event::trial_confirmed, sequence);
+    } else if (is_other_set) {
+      tell(was.command == wire::Command::rollback ? Event::rolled_back : Event::activated, sequence);
+    }
+  }
+}
+
 void Device::robot_record(wire::ByteOrder order, std::uint8_t* out) const {
   wire::encode(robot_, name_.data(), name_size_, order, out);
 }
@@ -116,6 +213,11 @@ wire::Status Device::status() const {
     s.cycles_by_status[k] = p.cycles_by_status[k].load(std::memory_order_relaxed);
   }
   s.last_status = static_cast<std::uint16_t>(p.last_status.load(std::memory_order_relaxed));
+  if (denied_) {
+    s.answer = static_cast<std::uint16_t>(wire::Answer::not_authorised);
+    s.refusal = 0;
+    s.detail = 0;
+  }
   return s;
 }
 

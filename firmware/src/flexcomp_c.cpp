@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The C interface: builds every object in the caller's memory and forwards the calls.
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <new>
 
 #include "flexcomp.h"
+#include "flexcomp_firmware/arithmetic.hpp"
 #include "flexcomp_firmware/canopen.hpp"
 #include "flexcomp_firmware/device.hpp"
 #include "flexcomp_firmware/modbus.hpp"
@@ -49,13 +51,26 @@ struct Arm {
     return result(h.write(h.user, slot, offset, from, size));
   }
 
+  static bool permit(void* user, flexcomp::wire::Command command, fw::Origin origin) {
+    const flexcomp_hooks& h = static_cast<Arm*>(user)->asked;
+    return h.permit(h.user, static_cast<unsigned>(command), origin <= local_staging ? 1U : 0U) != 0;
+  }
+  static void log(void* user, fw::Event event, std::uint32_t detail) {
+    const flexcomp_hooks& h = static_cast<Arm*>(user)->asked;
+    h.log(h.user, static_cast<unsigned>(event), detail);
+  }
+
   /// A number that no other bus object of this arm has.
   fw::Origin next_origin() { return ++origins; }
 
+  /// Who stages by flexcomp_stage_begin().
+  static constexpr fw::Origin local_staging = fw::nobody + 1;
+
   const flexcomp_storage hooks;
+  flexcomp_hooks asked{};
   fw::Device device;
   const fw::FirmwareContext context;
-  fw::Origin origins = fw::nobody;
+  fw::Origin origins = local_staging;
 };
 
 struct Can {
@@ -151,13 +166,73 @@ bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
   return norm > fw::Scalar(0.998F) && norm < fw::Scalar(1.002F);
 }
 
+/// Greatest slope near singularities up to which the law of damping (C9) was measured to keep what it promises.
+constexpr fw::Scalar most_steepest = fw::Scalar(200);
+
 bool is_above_zero(fw::Scalar v) { return flexcomp::is_finite(v) && v > fw::Scalar(0); }
 
-bool has_bounded_motion(const flexcomp_settings& s) {
+bool is_sensible(const flexcomp_settings& s) {
+  if (!is_above_zero(s.steepest) || s.steepest > most_steepest) return false;
   for (const fw::Scalar rate : s.correction_rate_rad_s) {
     if (!is_above_zero(rate)) return false;
   }
   return s.cycle_us != 0 && is_above_zero(s.offset_rate_rad_s) && is_above_zero(s.offset_acceleration_rad_s2);
+}
+
+fw::FirmwareContext context_from(const flexcomp_context& from) {
+  fw::FirmwareContext c;
+  c.payload_kg = from.payload_kg;
+  for (std::size_t k = 0; k < 3; ++k) {
+    c.payload_com_m[k] = from.payload_com_m[k];
+    c.force_n[k] = from.force_n[k];
+  }
+  c.temperature_c = from.temperature_c;
+  c.time_s = from.time_s;
+  for (std::size_t j = 0; j < fw::joints; ++j) c.relative_speed[j] = from.relative_speed[j];
+  return c;
+}
+
+// A C array and a std::array have the same layout.
+static_assert(sizeof(fw::Joints) == sizeof(flexcomp_real[FLEXCOMP_JOINTS]), "nothing but the numbers");
+const fw::Joints& joints_of(const flexcomp_real* q) { return *reinterpret_cast<const fw::Joints*>(q); }
+
+/// What is computed at readings beside the step: the set in use and the context with the tracked directions. The model is
+/// null where there is no set; `is_valid` is false where a number is not finite.
+struct AtReadings {
+  AtReadings(const Arm& arm, const flexcomp_real* readings, const flexcomp_context* from)
+      : context(from != nullptr ? context_from(*from) : arm.context), q(joints_of(readings)) {
+    model = arm.device.cycle().current(context);
+    is_valid = flexcomp::detail::is_finite_context(context);
+    for (const fw::Scalar reading : q) {
+      const fw::Scalar most = flexcomp::LargestAngle<fw::Scalar>::value();
+      if (!(reading <= most && -reading <= most)) is_valid = false;
+    }
+  }
+  fw::FirmwareContext context;
+  const fw::Joints q;
+  const fw::FirmwareModel* model;
+  bool is_valid;
+};
+
+/// Hamilton quaternion (w, x, y, z), w >= 0, of a rotation matrix: from its largest component (Shepperd).
+template <class Matrix>
+void quaternion_of(const Matrix& r, flexcomp_real* wxyz) {
+  const fw::Scalar one = fw::Scalar(1);
+  const fw::Scalar four_squares[4] = {one + r(0, 0) + r(1, 1) + r(2, 2), one + r(0, 0) - r(1, 1) - r(2, 2),
+                                      one - r(0, 0) + r(1, 1) - r(2, 2), one - r(0, 0) - r(1, 1) + r(2, 2)};
+  std::size_t k = 0;
+  for (std::size_t i = 1; i < 4; ++i) {
+    if (four_squares[i] > four_squares[k]) k = i;
+  }
+  const fw::Scalar x = r(2, 1) - r(1, 2), y = r(0, 2) - r(2, 0), z = r(1, 0) - r(0, 1);
+  const fw::Scalar xy = r(1, 0) + r(0, 1), xz = r(0, 2) + r(2, 0), yz = r(2, 1) + r(1, 2);
+  const fw::Scalar products[4][4] = {{four_squares[0], x, y, z},
+                                     {x, four_squares[1], xy, xz},
+                                     {y, xy, four_squares[2], yz},
+                                     {z, xz, yz, four_squares[3]}};
+  fw::Scalar scale = fw::Scalar(0.5F) / std::sqrt(four_squares[k]);
+  if (products[k][0] < fw::Scalar(0)) scale = -scale;
+  for (std::size_t i = 0; i < 4; ++i) wxyz[i] = products[k][i] * scale;
 }
 
 namespace step_flag = flexcomp::step_flag;
@@ -188,7 +263,9 @@ void flexcomp_robot_default(flexcomp_robot* robot) {
 
 void flexcomp_settings_default(flexcomp_settings* settings) {
   const fw::DeviceSettings d;
+  settings->struct_size = sizeof *settings;
   settings->largest_correction_rad = d.control.compensation.largest_correction_rad;
+  settings->steepest = d.control.compensation.steepest;
   settings->direction_band_rad = d.control.direction_band_rad;
   settings->plausible_position_m = d.store.plausible_position_m;
   settings->plausible_orientation_rad = d.store.plausible_orientation_rad;
@@ -208,17 +285,36 @@ void flexcomp_settings_default(flexcomp_settings* settings) {
        l.instructions, r.payload_kg, r.com_m,    r.force_n,       r.temperature_k};
 }
 
-flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* robot,
-                            const flexcomp_settings* settings, const flexcomp_storage* storage) {
+flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_robot* robot,
+                                    const flexcomp_settings* settings, const flexcomp_storage* storage,
+                                    unsigned* error, size_t real_bytes, size_t joints, size_t terms,
+                                    size_t tables, size_t table_values, size_t staging_bytes,
+                                    size_t struct_bytes) {
+  unsigned nowhere;
+  if (error == nullptr) error = &nowhere;
+  const size_t library[] = {FLEXCOMP_BUILD_};
+  const size_t program[] = {real_bytes, joints, terms, tables, table_values, staging_bytes, struct_bytes};
+  *error = real_bytes != library[0]                             ? FLEXCOMP_INIT_OTHER_SCALAR
+           : struct_bytes != library[6]                         ? FLEXCOMP_INIT_OTHER_STRUCTS
+           : std::memcmp(library, program, sizeof library) != 0 ? FLEXCOMP_INIT_OTHER_CAPACITY
+                                                                : FLEXCOMP_INIT_DONE;
+  if (*error != FLEXCOMP_INIT_DONE) return nullptr;
   fw::Robot nominal;
-  if (!fits<Arm>(memory, size) || robot == nullptr || !take_robot(*robot, nominal)) return nullptr;
   flexcomp_settings s;
   flexcomp_settings_default(&s);
-  if (settings != nullptr) s = *settings;
-  if (!has_bounded_motion(s)) return nullptr;
+  if (settings != nullptr && settings->struct_size == sizeof s) s = *settings;
+  if (!fits<Arm>(memory, size)) {
+    *error = FLEXCOMP_INIT_MEMORY;
+  } else if (robot == nullptr || !take_robot(*robot, nominal)) {
+    *error = FLEXCOMP_INIT_ROBOT;
+  } else if ((settings != nullptr && settings->struct_size != sizeof s) || !is_sensible(s)) {
+    *error = FLEXCOMP_INIT_SETTINGS;
+  }
+  if (*error != FLEXCOMP_INIT_DONE) return nullptr;
   const flexcomp_storage none = flexcomp_storage();
   fw::DeviceSettings d;
   d.control.compensation.largest_correction_rad = s.largest_correction_rad;
+  d.control.compensation.steepest = s.steepest;
   d.control.direction_band_rad = s.direction_band_rad;
   for (std::size_t j = 0; j < fw::joints; ++j)
     d.control.motion.correction_rate_rad_s[j] = s.correction_rate_rad_s[j];
@@ -240,10 +336,42 @@ flexcomp_arm* flexcomp_init(void* memory, size_t size, const flexcomp_robot* rob
   return reinterpret_cast<flexcomp_arm*>(new (memory) Arm(nominal, storage != nullptr ? *storage : none, d));
 }
 
+const char* flexcomp_init_error_text(unsigned error) {
+  switch (error) {
+    case FLEXCOMP_INIT_DONE:
+      return "done";
+    case FLEXCOMP_INIT_MEMORY:
+      return "the memory is missing, too small or not aligned to 8 bytes";
+    case FLEXCOMP_INIT_ROBOT:
+      return "the robot is not valid";
+    case FLEXCOMP_INIT_SETTINGS:
+      return "a setting is out of range, or the settings do not begin with flexcomp_settings_default";
+    case FLEXCOMP_INIT_OTHER_SCALAR:
+      return "the program is compiled with another FLEXCOMP_SCALAR than the library";
+    case FLEXCOMP_INIT_OTHER_CAPACITY:
+      return "the program is compiled with other capacities of flexcomp_config.h than the library";
+    case FLEXCOMP_INIT_OTHER_STRUCTS:
+      return "the program is compiled with another version of flexcomp.h, or another layout, than the "
+             "library";
+    default:
+      return "unknown reason";
+  }
+}
+
+void flexcomp_set_hooks(flexcomp_arm* fc, const flexcomp_hooks* hooks) {
+  Arm& arm = arm_of(fc);
+  arm.asked = hooks != nullptr ? *hooks : flexcomp_hooks();
+  fw::DeviceHooks d;
+  d.user = &arm;
+  if (arm.asked.permit != nullptr) d.permit = Arm::permit;
+  if (arm.asked.log != nullptr) d.log = Arm::log;
+  arm.device.set_hooks(d);
+}
+
 unsigned flexcomp_boot(flexcomp_arm* fc) {
-  fw::Store& store = arm_of(fc).device.store();
-  store.boot();
-  return store.faults();
+  fw::Device& device = arm_of(fc).device;
+  device.boot();
+  return device.store().faults();
 }
 
 void flexcomp_context_default(const flexcomp_arm* fc, flexcomp_context* context) {
@@ -266,30 +394,123 @@ flexcomp_status flexcomp_step(flexcomp_arm* fc, const flexcomp_real q_command_ra
                               const flexcomp_context* context,
                               flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS]) {
   Arm& arm = arm_of(fc);
-  // A C array and a std::array have the same layout.
-  static_assert(sizeof(fw::Joints) == sizeof(flexcomp_real[FLEXCOMP_JOINTS]), "nothing but the numbers");
-  const fw::Joints& q = *reinterpret_cast<const fw::Joints*>(q_command_rad);
+  const fw::Joints& q = joints_of(q_command_rad);
   fw::StepResult result;
   if (context == nullptr) {
     arm.device.step(q, arm.context, result);
   } else {
-    fw::FirmwareContext c;
-    c.payload_kg = context->payload_kg;
-    for (std::size_t k = 0; k < 3; ++k) {
-      c.payload_com_m[k] = context->payload_com_m[k];
-      c.force_n[k] = context->force_n[k];
-    }
-    c.temperature_c = context->temperature_c;
-    c.time_s = context->time_s;
-    for (std::size_t j = 0; j < fw::joints; ++j) c.relative_speed[j] = context->relative_speed[j];
-    arm.device.step(q, c, result);
+    arm.device.step(q, context_from(*context), result);
   }
   FLEXCOMP_UNROLL
   for (std::size_t j = 0; j < fw::joints; ++j) q_corrected_rad[j] = result.q[j];
   return static_cast<flexcomp_status>(result.status);
 }
 
-void flexcomp_poll(flexcomp_arm* fc, uint32_t now_ms) { arm_of(fc).device.store().poll(now_ms); }
+flexcomp_status flexcomp_step_rate(flexcomp_arm* fc, const flexcomp_real q_command_rad[FLEXCOMP_JOINTS],
+                                   const flexcomp_real q_rate_command_rad_s[FLEXCOMP_JOINTS],
+                                   const flexcomp_context* context,
+                                   flexcomp_real q_corrected_rad[FLEXCOMP_JOINTS],
+                                   flexcomp_real q_rate_corrected_rad_s[FLEXCOMP_JOINTS]) {
+  Arm& arm = arm_of(fc);
+  fw::StepResult result;
+  fw::Joints rate;
+  const fw::Joints& q = joints_of(q_command_rad);
+  const fw::Joints& q_rate = joints_of(q_rate_command_rad_s);
+  if (context == nullptr) {
+    arm.device.step_rate(q, q_rate, arm.context, result, rate);
+  } else {
+    arm.device.step_rate(q, q_rate, context_from(*context), result, rate);
+  }
+  for (std::size_t j = 0; j < fw::joints; ++j) {
+    q_corrected_rad[j] = result.q[j];
+    q_rate_corrected_rad_s[j] = rate[j];
+  }
+  return static_cast<flexcomp_status>(result.status);
+}
+
+int flexcomp_get_diagnostics(const flexcomp_arm* fc, flexcomp_diagnostics* diagnostics) {
+  if (diagnostics == nullptr || diagnostics->struct_size != sizeof *diagnostics) return 0;
+  const fw::ControlCycle& cycle = arm_of(fc).device.cycle();
+  const fw::ControlPublication& p = cycle.publication();
+  diagnostics->cycles = p.cycles.load(std::memory_order_relaxed);
+  for (std::size_t k = 0; k < 6; ++k)
+    diagnostics->cycles_by_status[k] = p.cycles_by_status[k].load(std::memory_order_relaxed);
+  diagnostics->status = static_cast<flexcomp_status>(p.last_status.load(std::memory_order_relaxed));
+  diagnostics->flags = p.last_flags.load(std::memory_order_relaxed);
+  diagnostics->remaining_position_m = cycle.remaining_position_m();
+  diagnostics->remaining_orientation_rad = cycle.remaining_orientation_rad();
+  for (std::size_t j = 0; j < fw::joints; ++j) {
+    diagnostics->correction_rad[j] = cycle.output().correction()[j];
+    diagnostics->offset_rad[j] = cycle.output().offset()[j];
+    diagnostics->direction[j] = cycle.direction(j);
+  }
+  return 1;
+}
+
+int flexcomp_uncorrect(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                       const flexcomp_context* context, flexcomp_real q_command_rad[FLEXCOMP_JOINTS]) {
+  const Arm& arm = arm_of(fc);
+  const AtReadings at(arm, q_reading_rad, context);
+  fw::Joints q = at.q;
+  bool found = at.is_valid;
+  if (at.is_valid && at.model != nullptr) {
+    found = fw::nominal_command(*at.model, at.q, at.context, arm.device.cycle().settings().compensation, q);
+  }
+  for (std::size_t j = 0; j < fw::joints; ++j) q_command_rad[j] = q[j];
+  return found ? 1 : 0;
+}
+
+int flexcomp_tool_pose(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                       const flexcomp_context* context, flexcomp_real xyz_m[3], flexcomp_real wxyz[4]) {
+  const AtReadings at(arm_of(fc), q_reading_rad, context);
+  if (!at.is_valid || at.model == nullptr) return 0;
+  const flexcomp::Pose<fw::Scalar> pose = fw::tool_pose(*at.model, at.q, at.context);
+  for (int k = 0; k < 3; ++k) xyz_m[k] = pose.position[k];
+  quaternion_of(pose.rotation, wxyz);
+  return 1;
+}
+
+int flexcomp_joint_loads(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
+                         const flexcomp_context* context, flexcomp_real torque_nm[FLEXCOMP_JOINTS],
+                         flexcomp_real deflection_rad[FLEXCOMP_JOINTS]) {
+  const AtReadings at(arm_of(fc), q_reading_rad, context);
+  if (!at.is_valid || at.model == nullptr) return 0;
+  const flexcomp::JointLoads<fw::Scalar, fw::joints> loads = fw::loads_of_joints(*at.model, at.q, at.context);
+  for (std::size_t j = 0; j < fw::joints; ++j) {
+    torque_nm[j] = loads.torque_nm[j];
+    deflection_rad[j] = loads.deflection_rad[j];
+  }
+  return 1;
+}
+
+unsigned flexcomp_stage_begin(flexcomp_arm* fc, uint32_t bytes) {
+  return static_cast<unsigned>(
+      arm_of(fc).device.run(flexcomp::wire::Command::begin, bytes, Arm::local_staging));
+}
+
+unsigned flexcomp_stage_write(flexcomp_arm* fc, uint32_t offset, const uint8_t* bytes, uint32_t size) {
+  if (bytes == nullptr) return static_cast<unsigned>(flexcomp::wire::Answer::bad_argument);
+  return static_cast<unsigned>(arm_of(fc).device.store().write(offset, bytes, size, Arm::local_staging));
+}
+
+unsigned flexcomp_stage_verify(flexcomp_arm* fc) {
+  return static_cast<unsigned>(arm_of(fc).device.run(flexcomp::wire::Command::verify, 0, Arm::local_staging));
+}
+
+unsigned flexcomp_stage_commit(flexcomp_arm* fc) {
+  return static_cast<unsigned>(arm_of(fc).device.run(flexcomp::wire::Command::commit, 0, Arm::local_staging));
+}
+
+unsigned flexcomp_stage_commit_trial(flexcomp_arm* fc, uint32_t cycles) {
+  return static_cast<unsigned>(
+      arm_of(fc).device.run(flexcomp::wire::Command::commit_trial, cycles, Arm::local_staging));
+}
+
+unsigned flexcomp_stage_abort(flexcomp_arm* fc) {
+  return static_cast<unsigned>(arm_of(fc).device.run(flexcomp::wire::Command::abort, 0, Arm::local_staging));
+}
+
+void flexcomp_poll(flexcomp_arm* fc, uint32_t now_ms) { arm_of(fc).device.poll(now_ms); }
 
 void flexcomp_get_state(const flexcomp_arm* fc, flexcomp_state* state) {
   const flexcomp::wire::Status s = arm_of(fc).device.status();
@@ -308,7 +529,7 @@ void flexcomp_get_state(const flexcomp_arm* fc, flexcomp_state* state) {
 unsigned flexcomp_command(flexcomp_arm* fc, unsigned command) {
   const flexcomp::wire::Command c =
       command <= 0xFFFFU ? static_cast<flexcomp::wire::Command>(command) : flexcomp::wire::Command::none;
-  return static_cast<unsigned>(arm_of(fc).device.store().run(c, 0, fw::nobody));
+  return static_cast<unsigned>(arm_of(fc).device.run(c, 0, fw::nobody));
 }
 
 const char* flexcomp_status_text(flexcomp_status status) {

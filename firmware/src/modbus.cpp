@@ -184,7 +184,7 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, con
       return Exception::none;
     case Block::command:
       command_ = be16(from);
-      return exception_of(device_.store().run(static_cast<wire::Command>(command_), argument_, origin_));
+      return exception_of(device_.run(static_cast<wire::Command>(command_), argument_, origin_));
     case Block::staging_offset:
       patch32(staging_offset_, first, quantity, from);
       return Exception::none;

@@ -152,7 +152,14 @@ int main(void) {
   EXPECT(flexcomp_init(&memory, sizeof memory, &robot, NULL, &storage) == NULL);
   robot.max_rad[0] = 3;
 
+  memset(&settings, 0, sizeof settings);
+  {
+    unsigned error = 0;
+    EXPECT(flexcomp_init_explained(&memory, sizeof memory, &robot, &settings, &storage, &error) == NULL);
+    EXPECT(error == FLEXCOMP_INIT_SETTINGS && strlen(flexcomp_init_error_text(error)) > 10);
+  }
   flexcomp_settings_default(&settings);
+  EXPECT(settings.struct_size == sizeof settings);
   settings.cycle_us = 0;
   EXPECT(flexcomp_init(&memory, sizeof memory, &robot, &settings, &storage) == NULL);
   settings.cycle_us = 2000;
@@ -259,6 +266,35 @@ int main(void) {
     EXPECT(state.store == 0);
   }
   EXPECT(flexcomp_command(fc, FLEXCOMP_COMMAND_ROLLBACK) == 7);
+
+  /* The calls beside the step. */
+  {
+    static const flexcomp_real rate[FLEXCOMP_JOINTS] = {1, 0, 0, 0, 0, (flexcomp_real)0.5};
+    flexcomp_real out_rate[FLEXCOMP_JOINTS];
+    flexcomp_real wxyz[4];
+    flexcomp_diagnostics diagnostics;
+    diagnostics.struct_size = 0;
+    EXPECT(flexcomp_get_diagnostics(fc, &diagnostics) == 0);
+    diagnostics.struct_size = sizeof diagnostics;
+    for (j = 0; j < 6; ++j) q[j] = (flexcomp_real)(0.2 + 0.1 * j);
+    for (j = 0; j < 2000; ++j) flexcomp_step_rate(fc, q, rate, NULL, out, out_rate);
+    EXPECT(flexcomp_step_flags(fc) == 0);
+    for (j = 0; j < 6; ++j) EXPECT(fabs((double)(out_rate[j] - rate[j])) < 1e-5); /* a set without terms */
+    EXPECT(flexcomp_get_diagnostics(fc, &diagnostics) == 1 && diagnostics.status == FLEXCOMP_OK);
+    EXPECT(diagnostics.cycles > 2000 && diagnostics.remaining_position_m < 1e-6);
+    EXPECT(flexcomp_uncorrect(fc, q, NULL, out) == 1 && fabs((double)(out[3] - q[3])) < 1e-5);
+    EXPECT(flexcomp_tool_pose(fc, q, &context, out, wxyz) == 1);
+    EXPECT(fabs((double)(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]) - 1) <
+           1e-5);
+    EXPECT(flexcomp_joint_loads(fc, q, &context, out, out_rate) == 1 && fabs((double)out_rate[1]) < 1e-12);
+    EXPECT(flexcomp_stage_begin(fc, sizeof image) == 0);
+    EXPECT(flexcomp_stage_write(fc, 0, image, sizeof image) == 0);
+    flexcomp_stage_verify(fc);
+    for (now = 0; now < 100; ++now) flexcomp_poll(fc, now);
+    flexcomp_get_state(fc, &state);
+    EXPECT(state.answer == 1 && state.refusal == 17); /* the sequence is not above the active one */
+    for (j = 0; j < 6; ++j) q[j] = 0;
+  }
 
   /* The next start. */
   fc = flexcomp_init(&memory, sizeof memory, &robot, NULL, &storage);

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "firmware/bench.hpp"
+#include "flexcomp_firmware/arithmetic.hpp"
 
 namespace flexcomp::firmware::bench {
 namespace {
@@ -36,8 +37,18 @@ TEST(Handover, EveryCycleUsesOneWholeSet) {
   std::atomic<bool> stop{false};
   std::atomic<std::uint32_t> wrong{0};
   std::atomic<std::uint32_t> seen{0};  // bit n: set n was used
+  // What is computed beside the step, in either context: by one whole set as well.
+  const auto count_wrong_beside_the_step = [&] {
+    FirmwareContext tracked = context;
+    const FirmwareModel* model = device.cycle().current(tracked);
+    if (model == nullptr) return;
+    StepResult r;
+    corrected_command(*model, q, tracked, settings.control.compensation, r);
+    if (std::find(results.begin(), results.end(), r.q) == results.end()) ++wrong;
+  };
   std::thread cycle([&] {
     while (!stop.load()) {
+      count_wrong_beside_the_step();
       const StepResult r = device.step(q, context);
       bool known = false;
       for (std::uint32_t n = 0; n < results.size(); ++n) {
@@ -61,6 +72,7 @@ TEST(Handover, EveryCycleUsesOneWholeSet) {
   for (int k = 0; pushed < 200 || rounds < 3 || seen.load() != all; ++k) {
     if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(60)) break;
     store.poll(now += 1);
+    count_wrong_beside_the_step();
     const std::uint32_t next = store.active_sequence() + 1;
     if (next <= sets) {
       const Bytes& image = images[next - 1];

@@ -48,6 +48,29 @@ bool steps(flexcomp_arm* arm, Counts& counts, bool regular = false) {
   return true;
 }
 
+/// The same commands with a rate, by flexcomp_step_rate.
+bool steps_with_rate(flexcomp_arm* arm, Counts& counts) {
+  budget::Commands commands(1);
+  counts = {};
+  const Scalar rate[6] = {Scalar(1), Scalar(-0.5F), Scalar(0.5F), Scalar(1), Scalar(-1), Scalar(1)};
+  for (std::uint32_t k = 0; k < calls; ++k) {
+    std::array<Scalar, 6> command;
+    do {
+      commands.next(command.data());
+    } while (!budget::is_regular(nominal, command));
+    Scalar* const q = command.data();
+    Scalar corrected_rate[6];
+    const std::uint32_t from = ticks();
+    const flexcomp_status status = flexcomp_step_rate(arm, q, rate, nullptr, q, corrected_rate);
+    const std::uint32_t count = instructions(from + own, ticks());
+    if (status >= FLEXCOMP_NO_SET) return false;
+    if (count < counts.least) counts.least = count;
+    if (count > counts.most) counts.most = count;
+    counts.sum += count;
+  }
+  return true;
+}
+
 flexcomp_arm* arm_with(budget::Set set, std::uint32_t cycle_us) {
   flexcomp_settings settings;
   flexcomp_settings_default(&settings);
@@ -170,6 +193,10 @@ int main() {
   print("step, eleven kinds of effect, regular poses, mean: ", eleven.sum / calls, "\n");
   print("step, eleven kinds of effect, regular poses, most: ", eleven.most, "\n");
   if (!regular_poses(arm)) return 4;
+  Counts rate;
+  if (!steps_with_rate(arm, rate)) return 8;
+  print("step_rate, 39 terms, regular poses, mean: ", rate.sum / calls, "\n");
+  print("step_rate, 39 terms, regular poses, most: ", rate.most, "\n");
   image_check();
   if (!sdo_request(arm)) return 5;
   if (!modbus_request(arm)) return 6;

@@ -24,4 +24,6 @@ function(flexcomp_example name source)
 endfunction()
 
 flexcomp_example(minimal_controller minimal_controller.c LIBRARIES flexcomp_firmware)
+flexcomp_example(two_arms two_arms.c LIBRARIES flexcomp_firmware)
+flexcomp_example(servo_loop servo_loop.c LIBRARIES flexcomp_firmware)
 flexcomp_example(core_only core_only.cpp LIBRARIES flexcomp_core)

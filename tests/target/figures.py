@@ -31,13 +31,20 @@ import write_tables
 HOOKS = [
     (r"_ZN8flexcomp8firmware5Store\w*", [r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write)E\w*"]),
     (r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write)E\w*", []),
+    (r"_ZN8flexcomp8firmware6Device(4boot|4poll|3run|13begin_unknown)E[\w.]*",
+     [r"_ZN8flexcomp8firmware6Device7observeE[\w.]*", r"_ZN12_GLOBAL__N_13Arm(6permit|3log)E\w*"]),
+    (r"_ZN8flexcomp8firmware6Device(7observe|12is_permitted)E[\w.]*", [r"_ZN12_GLOBAL__N_13Arm(6permit|3log)E\w*"]),
+    (r"_ZZN8flexcomp8firmware6Device7observe[\w.]*", [r"_ZN12_GLOBAL__N_13Arm3logE\w*"]),
+    (r"_ZN12_GLOBAL__N_13Arm(6permit|3log)E\w*", []),
     (r"_ZN8flexcomp8firmware11CanopenNode\w*", [r"_ZN12_GLOBAL__N_13Can8transmitE\w*"]),
     (r"_ZN12_GLOBAL__N_13Can8transmitE\w*", []),
     (r"_ZN8flexcomp8firmware9Modbus(Rtu|Tcp)\w*", []),
 ]
 
-ENTRIES = ["init", "boot", "step", "poll", "get_state", "command", "can_receive", "can_poll", "rtu_receive", "rtu_poll",
-           "tcp_receive"]
+ENTRIES = ["init", "boot", "step", "step_rate", "uncorrect", "tool_pose", "joint_loads", "poll",
+           "get_state", "command", "can_receive", "can_poll", "rtu_receive", "rtu_poll", "tcp_receive"]
+# flexcomp_init is a macro.
+FUNCTIONS = {"init": "flexcomp_init_checked"}
 # Sources that are compiled for speed, and what they share with the others but do not call in a cycle.
 STEP = {"control", "arithmetic"}
 NOT_OF_THE_STEP = r"float_from_bits|bits_from_float"
@@ -176,7 +183,7 @@ def measure(build, tools):
     figures["ram static"] = max(0, (sections(image("both_buses"), tools)[1] - nothing[1] - own) // 8 * 8)
     graph, paths = call_graph(build, tools), {}
     for entry in ENTRIES:
-        figures[f"stack {entry}"], paths[entry] = graph.worst(f"flexcomp_{entry}")
+        figures[f"stack {entry}"], paths[entry] = graph.worst(FUNCTIONS.get(entry, f"flexcomp_{entry}"))
     return figures, paths
 
 

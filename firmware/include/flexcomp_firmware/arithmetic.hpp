@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "flexcomp/arm_state.hpp"
+#include "flexcomp/forward.hpp"
 #include "flexcomp/image.hpp"
 #include "flexcomp/status.hpp"
 #include "flexcomp_firmware/config.hpp"
@@ -21,6 +22,23 @@ namespace firmware {
 void corrected_command(const FirmwareModel& model, const Joints& q_command_rad,
                        const FirmwareContext& context, const CompensationSettings<Scalar>& settings,
                        Compensated<Scalar, joints>& out);
+
+/// compensate_rate() of the core (C22).
+bool corrected_rate(const FirmwareModel& model, const Joints& q_command_rad, const Joints& q_rate_rad_s,
+                    const FirmwareContext& context, const CompensationSettings<Scalar>& settings,
+                    Compensated<Scalar, joints>& out, Joints& q_rate_out_rad_s);
+
+/// uncorrect() of the core (C21).
+bool nominal_command(const FirmwareModel& model, const Joints& q_reading_rad, const FirmwareContext& context,
+                     const CompensationSettings<Scalar>& settings, Joints& q_command_rad);
+
+/// forward() of the core (M15).
+Pose<Scalar> tool_pose(const FirmwareModel& model, const Joints& q_reading_rad,
+                       const FirmwareContext& context);
+
+/// joint_loads() of the core.
+JointLoads<Scalar, joints> loads_of_joints(const FirmwareModel& model, const Joints& q_reading_rad,
+                                           const FirmwareContext& context);
 
 /// remaining_error() of the core.
 RemainingError<Scalar> remaining_error(const FirmwareModel& model, const Joints& q_rad,

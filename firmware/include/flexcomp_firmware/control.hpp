@@ -56,6 +56,8 @@ struct ControlPublication {
   std::atomic<std::uint32_t> last_flags{0};                         ///< bits of step_flag
   std::array<std::atomic<std::uint32_t>, joints> correction_rad{};  ///< binary32 bits
   std::atomic<std::uint32_t> largest_correction_rad{0};  ///< binary32 bits, of any joint since the start
+  /// Tracked directions (C18), binary32 bits; kept up only for a set that reads them.
+  std::array<std::atomic<std::uint32_t>, joints> direction{};
 };
 
 /// State and step of the control cycle. One thread or interrupt calls step(); nothing here is shared but the
@@ -84,6 +86,24 @@ class ControlCycle {
   /// correction. Bounded work on any input.
   void step(const Joints& q_command_rad, const FirmwareContext& context, StepResult& out);
 
+  /// step() with the rate of the output, rad/s, for feed-forward.
+  ///
+  /// Where nothing holds back it is the derivative (C22) along the rate of the command; where only an offset settles, that
+  /// and the offset's motion. Everywhere else it is what was put out: the command's rate and the change of the correction
+  /// since the last cycle; 0 where the output stands. A joint's rate that is not finite makes all count as 0. Always finite.
+  void step_rate(const Joints& q_command_rad, const Joints& q_rate_command_rad_s,
+                 const FirmwareContext& context, StepResult& out, Joints& q_rate_rad_s);
+
+  /// The set that is in use, or null, with the directions as tracked in `context`: for what is computed beside the step.
+  /// Both contexts, also at the same time; of the background's the model is valid until the store's next poll or command,
+  /// of the cycle's until the next step.
+  const FirmwareModel* current(FirmwareContext& context) const;
+
+  /// Error that the last step leaves, as its last iterate shows it. Of the cycle.
+  Scalar remaining_position_m() const { return remaining_position_; }
+  /// The same of orientation.
+  Scalar remaining_orientation_rad() const { return remaining_orientation_; }
+
   /// State for the background.
   const ControlPublication& publication() const { return publication_; }
   /// Settings in use.
@@ -94,12 +114,18 @@ class ControlCycle {
   const OutputStage<Scalar, joints>& output() const { return output_; }
 
  private:
+  /// What a step knows before anything is computed.
+  struct Input {
+    const FirmwareModel* model;  ///< null: no set
+    bool is_finite;              ///< the command
+  };
+  Input begin(const Joints& q_command_rad);
+  bool finish(const Input& input, const Joints& q_command_rad, const FirmwareContext& context,
+              StepResult& out);
   void track(const Joints& q);
-  void correct(const FirmwareModel& model, const Joints& q_command_rad, const FirmwareContext& context,
-               StepResult& out) const;
   bool is_within_limits(const Joints& q) const;
   bool context_jumped(const FirmwareContext& context);
-  void publish(const StepResult& out);
+  void publish(const StepResult& out, const FirmwareModel* model);
 
   ParameterSets& sets_;
   ControlSettings settings_;
@@ -116,6 +142,8 @@ class ControlCycle {
   Scalar last_payload_ = Scalar(0);
   Scalar last_temperature_ = Scalar(0);
   Scalar largest_ = Scalar(0);
+  Scalar remaining_position_ = Scalar(0);
+  Scalar remaining_orientation_ = Scalar(0);
   std::uint16_t last_cause_ = 0;
   bool tracking_ = false;
   bool is_new_set_ = false;

@@ -27,6 +27,30 @@ struct DeviceSettings {
   const char* name = nullptr;
 };
 
+/// What the hook `log` is told.
+enum class Event : std::uint8_t {
+  booted = 1,           ///< detail: bits of wire::fault
+  image_refused = 2,    ///< detail: Refusal
+  activated = 3,        ///< a committed set; detail: its sequence
+  trial_begun = 4,      ///< detail: sequence of the set on trial
+  trial_confirmed = 5,  ///< detail: its sequence
+  trial_reverted =
+      6,  ///< not confirmed, or not written; detail: sequence of the set that is active again, 0: none
+  rolled_back = 7,      ///< detail: sequence of the set that is active then, 0: none
+  restored = 8,         ///< both slots are erased; detail: 0
+  storage_failed = 9,   ///< detail: the last command that was accepted (wire::Command), 0 at the start
+  not_authorised = 10,  ///< `permit` refused; detail: wire::Command
+};
+
+/// What a device asks and tells, in the background. None of them may call back.
+struct DeviceHooks {
+  void* user = nullptr;  ///< given to both
+  /// False: the command is answered `not_authorised`. Null: all are allowed.
+  bool (*permit)(void* user, wire::Command command, Origin origin) = nullptr;
+  /// Told what has happened, from within the call in which it did.
+  void (*log)(void* user, Event event, std::uint32_t detail) = nullptr;
+};
+
 /// One arm. step() is for the thread or interrupt of the control cycle, everything else for the background.
 class Device {
  public:
@@ -48,6 +72,23 @@ class Device {
     step(q_command_rad, context, out);
     return out;
   }
+
+  /// ControlCycle::step_rate().
+  void step_rate(const Joints& q_command_rad, const Joints& q_rate_command_rad_s,
+                 const FirmwareContext& context, StepResult& out, Joints& q_rate_rad_s) {
+    cycle_.step_rate(q_command_rad, q_rate_command_rad_s, context, out, q_rate_rad_s);
+  }
+
+  /// Who is asked and told from now on; before boot() to hear of the start.
+  void set_hooks(const DeviceHooks& hooks);
+  /// Store::boot().
+  void boot();
+  /// Store::poll().
+  void poll(std::uint32_t now_ms);
+  /// Store::run(), where the hook permits it. Buses and local control pass here.
+  wire::Answer run(wire::Command command, std::uint32_t argument, Origin origin);
+  /// Store::begin_unknown(), where the hook permits wire::Command::begin.
+  wire::Answer begin_unknown(Origin origin);
 
   /// Compensation of one command by the active set, with an empty state (directions from the request; no
   /// output stage): compensate() of the core and nothing else, so that it equals the host's answer to the
@@ -80,6 +121,15 @@ class Device {
   const DeviceSettings& settings() const { return settings_; }  ///< as given
 
  private:
+  /// What the hook `log` has been told of.
+  struct Seen {
+    std::uint16_t state = 0, answer = 0, refusal = 0, faults = 0;
+    std::uint32_t sequence = 0, crc = 0;
+    wire::Command command = wire::Command::none;  ///< the last one that was accepted
+  };
+  bool is_permitted(wire::Command command, Origin origin);
+  static void observe(Device& device);
+
   const Robot robot_;
   const DeviceSettings settings_;
   std::array<char, wire::robot_name_bytes> name_{};
@@ -87,6 +137,10 @@ class Device {
   ParameterSets sets_{};
   ControlCycle cycle_;
   Store store_;
+  DeviceHooks hooks_{};
+  void (*observe_)(Device& device) = nullptr;  ///< null without `log`: what it needs is then not linked
+  Seen seen_{};
+  bool denied_ = false;  ///< the last command was not permitted
 };
 
 }  // namespace firmware

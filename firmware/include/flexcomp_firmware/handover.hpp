@@ -54,6 +54,17 @@ class Handover {
   /// Control cycles until the trial runs out; 0 where there is none.
   std::uint32_t trial_cycles_left() const { return left_.load(std::memory_order_relaxed); }
 
+  // --- both contexts, also at the same time -----------------------------------------------------------
+
+  /// A model whose contents stand still for as long as the caller's context does neither take() nor activate: the one that
+  /// the cycle uses, or the requested one where the cycle has not seen the request yet. Changes nothing. Only the background
+  /// writes models; it writes the one not in use, after the cycle has acknowledged the last request.
+  std::uint32_t readable() const {
+    const std::uint32_t request = request_.load(std::memory_order_acquire);
+    const std::uint32_t taken = taken_.load(std::memory_order_acquire);
+    return ((request ^ taken) < (1U << generation_shift) ? taken : request) & index_mask;
+  }
+
   // --- control cycle ----------------------------------------------------------------------------------
 
   /// The model to use in this cycle (0, 1 or none); `changed`: another one than in the cycle before.

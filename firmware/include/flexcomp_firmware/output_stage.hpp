@@ -117,6 +117,8 @@ class OutputStage {
     q_rad = output_;
   }
 
+  /// True where the output stands: after start() until a command comes near, and after hold().
+  bool is_standing() const { return state_ == State::standing || state_ == State::holding; }
   /// The correction that was put out for the last command that was used, rad.
   const Angles& correction() const { return correction_; }
   /// The offset of (C19), rad; exactly 0 where no event is settling.
