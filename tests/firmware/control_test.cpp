@@ -394,13 +394,14 @@ TEST(Step, WhatRemainsWhileItSettlesIsSaid) {
   ASSERT_EQ(arm.push(image), Answer::accepted);
   auto model = std::make_unique<FirmwareModel>();
   ASSERT_EQ(model_from_image(image.data(), image.size(), arm.robot, *model), Refusal::none);
-  const FirmwareContext context = default_context<Scalar>(arm.robot);
+  FirmwareContext context = default_context<Scalar>(arm.robot);
   const Joints q = {real(0.1), real(0.4), real(-0.5), real(0.3), real(0.9), real(0.2)};
   int settling = 0;
   Scalar greatest = Scalar(0);
   for (int k = 0; k < 1000; ++k) {
     const StepResult r = arm.step(q);
     if ((r.flags & step_flag::settling) != 0) ++settling;
+    for (std::size_t j = 0; j < joints; ++j) context.direction[j] = arm.device->cycle().direction(j);
     const auto left = remaining_error(*model, r.q, q, context);
     greatest = std::max(greatest, left.position_m);
     ASSERT_LE(left.position_m, r.remaining_position_m + real(2e-6));
