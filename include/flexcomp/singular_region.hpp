@@ -10,6 +10,7 @@
 #include <cstddef>
 
 #include "flexcomp/bounds.hpp"
+#include "flexcomp/bytes.hpp"
 #include "flexcomp/linear.hpp"
 #include "flexcomp/term.hpp"
 
@@ -34,11 +35,12 @@ struct SingularRegion {
 /// Least threshold, a singular value: what the scalar's rounding allows.
 template <class S>
 struct LeastSingular {
-  static constexpr double squared = 4e-6;  ///< 0.002
+  static constexpr double squared = 4e-6;  ///< 0.002 squared
 };
+/// The same in single precision.
 template <>
 struct LeastSingular<float> {
-  static constexpr float squared = 4e-4F;  ///< 0.02
+  static constexpr float squared = 4e-4F;  ///< 0.02 squared
 };
 
 /// Thresholds (C9) for a set that moves the tool by `motion`. None is above 0.1 as a singular value with lengths in m, so an arm
@@ -75,7 +77,7 @@ FLEXCOMP_RARE ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
   const auto length = [](const S& x, const S& y, const S& z) { return sqrt(x * x + y * y + z * z); };
   const auto& robot = model.robot();
   const auto& gravity = model.gravity();
-  const S weight = abs(S(robot.payload_kg)) * length(gravity[0], gravity[1], gravity[2]);
+  const S weight = abs(from_binary64<S>(robot.payload_kg)) * length(gravity[0], gravity[1], gravity[2]);
   std::array<S, M::most_tables> greatest{};
   for (std::size_t k = 0; k < model.table_count(); ++k) {
     const Table& table = model.table(k);
@@ -95,7 +97,8 @@ FLEXCOMP_RARE ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
   }
   const auto& tool = model.nominal_tool().position;
   S reach = length(tool[0], tool[1], tool[2]);
-  S arm = length(S(robot.payload_com_m[0]), S(robot.payload_com_m[1]), S(robot.payload_com_m[2]));
+  S arm = length(from_binary64<S>(robot.payload_com_m[0]), from_binary64<S>(robot.payload_com_m[1]),
+                 from_binary64<S>(robot.payload_com_m[2]));
   ToolMotion<S> motion;
   for (std::size_t i = n; i-- > 0;) {
     const auto& twist = model.plan().link_twist(i);

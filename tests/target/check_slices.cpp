@@ -109,7 +109,9 @@ int main() {
   flexcomp::boards::start_instruction_counter();
   const std::uint32_t from = ticks();
   own = ticks() - from;
-  if (!check("the paper's 39 terms and 6 curves", budget::make_image(budget::Set::curves, image, sizeof image))) return 2;
+  if (!check("the paper's 39 terms and 6 curves",
+             budget::make_image(budget::Set::curves, image, sizeof image)))
+    return 2;
   grid_of_all_values();
   if (!check("a grid of all values", encode(many(Basis::grid, false) / 8, 1))) return 3;
   if (!check("64 terms of a grid", encode(many(Basis::grid, false), 1))) return 4;
