@@ -46,7 +46,7 @@ struct Tolerance {
 };
 template <>
 struct Tolerance<float> {
-  static constexpr float joint_rad = 1e-7F;
+  static constexpr float joint_rad = 3e-7F;
   static constexpr float turn_rad = 1e-3F;
   static constexpr float pose = 1e-5F;
   static constexpr float own_rad = 3e-6F;
@@ -424,6 +424,15 @@ class Correction {
         deflection_[i] += change[i];
         q[i] -= step;
         ahead_[i] -= step;
+      }
+      // The first-order change leaves out the curvature of the deflection, which is of its own size (sines of some rad).
+      const S square = square_of(ahead_);
+      const S left = square_of(deflection_) * square * square;
+      const CyclePlan<S, N, Cap>& plan = model_.plan();
+      if (left <= Tolerance<S>::joint_rad * Tolerance<S>::joint_rad && !moves_ &&
+          plan.size(group::loaded) + plan.size(group::other) == 0) {
+        joint_left_ += left;
+        return;
       }
     }
     if (!loaded_ && !moves_ && model_.plan().size(group::other) == 0) return;
