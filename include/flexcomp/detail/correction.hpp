@@ -41,6 +41,7 @@ template <class S>
 struct Tolerance {
   static constexpr S joint_rad = S(1.5e-10);  ///< what an iteration may leave of a joint angle
   static constexpr S turn_rad = S(3e-4);      ///< correction after which the chain is not evaluated again
+  static constexpr S linearised = S(0);       ///< square of what (C13) may leave: in double it never suffices
   static constexpr S pose = S(1e-6);          ///< what an undamped chain may leave of the pose, m and rad
   static constexpr S own_rad = S(1e-8);       ///< curvature's part of the last step of the own deflections
 };
@@ -48,6 +49,7 @@ template <>
 struct Tolerance<float> {
   static constexpr float joint_rad = 3e-7F;
   static constexpr float turn_rad = 1e-3F;
+  static constexpr float linearised = 1e-14F;
   static constexpr float pose = 1e-5F;
   static constexpr float own_rad = 3e-6F;
 };
@@ -429,7 +431,7 @@ class Correction {
       const S square = square_of(ahead_);
       const S left = square_of(deflection_) * square * square;
       const CyclePlan<S, N, Cap>& plan = model_.plan();
-      if (left <= Tolerance<S>::joint_rad * Tolerance<S>::joint_rad && !moves_ &&
+      if (left <= Tolerance<S>::linearised && !moves_ &&
           plan.size(group::loaded) + plan.size(group::other) == 0) {
         joint_left_ += left;
         return;
