@@ -58,7 +58,7 @@ Joints deflection_by_loads(const Model<double>& model, const Joints& q,
 
 /// A term of every kind that moves links, base or tool.
 void add_moves(arms::TermSet<double>& set, arms::Random& random, double size) {
-  for (const std::size_t j : {1, 4}) {
+  for (const std::size_t j : {std::size_t{1}, std::size_t{4}}) {
     set.add(arms::on_link(j + 1, slot::alpha), Basis::sine, random.around(size), j, 1);
     set.add(arms::on_link(j + 1, slot::gamma), Basis::cosine, random.around(size), j, 2);
     set.add(arms::on_link(j, slot::gamma), Basis::direction, random.around(size), j);

@@ -309,9 +309,10 @@ TEST(StepRate, IsFiniteAndPlainWhereThereIsNoAnswer) {
       q[j] = real(2.3 * std::sin(k * 1e-3 * static_cast<double>(j + 1)));
       w[j] = real(2.3e-0 * static_cast<double>(j + 1) * std::cos(k * 1e-3 * static_cast<double>(j + 1)));
     }
-    if (k % 97 == 0) w[k % 6] = std::numeric_limits<Scalar>::max();
-    if (k % 101 == 0) w[k % 6] = std::numeric_limits<Scalar>::quiet_NaN();
-    if (k % 103 == 0) q[k % 6] = real(1e30);
+    const auto j = static_cast<std::size_t>(k % 6);
+    if (k % 97 == 0) w[j] = std::numeric_limits<Scalar>::max();
+    if (k % 101 == 0) w[j] = std::numeric_limits<Scalar>::quiet_NaN();
+    if (k % 103 == 0) q[j] = real(1e30);
     flexcomp_step_rate(arm.fc, q.data(), w.data(), nullptr, out.data(), rate.data());
     flags |= flexcomp_step_flags(arm.fc);
     ASSERT_TRUE(all_finite(rate) && all_finite(out)) << k;
