@@ -22,7 +22,6 @@ using flexcomp::AdmissionRanges;
 using flexcomp::Basis;
 using flexcomp::Certificate;
 using flexcomp::Covariate;
-using flexcomp::Measure;
 using flexcomp::Refusal;
 namespace slot = flexcomp::slot;
 
