@@ -2,7 +2,6 @@
 #include "flexcomp_firmware/control.hpp"
 
 #include <cmath>
-#include <cstring>
 
 #include "flexcomp/bounds.hpp"
 #include "flexcomp/bytes.hpp"
@@ -12,12 +11,6 @@ namespace flexcomp {
 namespace firmware {
 
 namespace {
-
-std::uint32_t float_bits(float v) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &v, sizeof bits);
-  return bits;
-}
 
 void count(std::atomic<std::uint32_t>& n) {
   // One writer, so a load and a store are enough; no read-modify-write that some cores would have to retry.
@@ -127,7 +120,7 @@ void ControlCycle::publish(const StepResult& out, const FirmwareModel* model) {
   Scalar largest = largest_;
   for (std::size_t j = 0; j < joints; ++j) {
     const Scalar c = output_.correction()[j];
-    publication_.correction_rad[j].store(float_bits(static_cast<float>(c)), std::memory_order_relaxed);
+    publication_.correction_rad[j].store(bits32_of(static_cast<float>(c)), std::memory_order_relaxed);
     const Scalar magnitude = std::fabs(c);
     if (magnitude > largest) largest = magnitude;
   }
@@ -135,10 +128,10 @@ void ControlCycle::publish(const StepResult& out, const FirmwareModel* model) {
   // Not in a function of its own: GCC 12.2 drops a call to one that makes nothing but atomic stores.
   if (model != nullptr && model->reads_direction()) {
     for (std::size_t j = 0; j < joints; ++j)
-      publication_.direction[j].store(float_bits(static_cast<float>(direction_[j])),
+      publication_.direction[j].store(bits32_of(static_cast<float>(direction_[j])),
                                       std::memory_order_relaxed);
   }
-  publication_.largest_correction_rad.store(float_bits(static_cast<float>(largest_)),
+  publication_.largest_correction_rad.store(bits32_of(static_cast<float>(largest_)),
                                             std::memory_order_relaxed);
 }
 
@@ -269,10 +262,8 @@ const FirmwareModel* ControlCycle::current(FirmwareContext& context) const {
   const std::uint32_t index = sets_.handover.readable();
   if (index == Handover::none) return nullptr;
   for (std::size_t j = 0; j < joints; ++j) {
-    const std::uint32_t bits = publication_.direction[j].load(std::memory_order_relaxed);
-    float direction;
-    std::memcpy(&direction, &bits, sizeof direction);
-    context.direction[j] = static_cast<Scalar>(direction);
+    context.direction[j] =
+        static_cast<Scalar>(float_of(publication_.direction[j].load(std::memory_order_relaxed)));
   }
   return &sets_.models[index];
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "flexcomp_firmware/device.hpp"
 
-#include <cstring>
-
 #include "flexcomp/image.hpp"
 #include "flexcomp_firmware/arithmetic.hpp"
 
@@ -11,14 +9,10 @@ namespace firmware {
 
 namespace {
 
+constexpr float degrees = 57.29577951F;  // of a radian
+
 /// Scalar of binary64 bits from the wire.
 Scalar scalar(std::uint64_t bits) { return from_binary64<Scalar>(double_of(bits)); }
-
-float float_of(std::uint32_t bits) {
-  float v;
-  std::memcpy(&v, &bits, sizeof v);
-  return v;
-}
 
 }  // namespace
 
@@ -245,7 +239,6 @@ wire::CertificateRecord Device::certificate() const {
 }
 
 std::uint32_t Device::certificate_summary(std::size_t sub) const {
-  constexpr float degrees = 57.29577951F;
   const FirmwareCertificate* c = store_.active_certificate();
   if (c == nullptr) return 0;
   if (sub == 1) return c->instructions;
@@ -257,13 +250,10 @@ std::uint32_t Device::certificate_summary(std::size_t sub) const {
   } else if (sub < 4 + joints) {
     v = static_cast<float>(c->deflection_rad[sub - 4]) * degrees;
   }
-  std::uint32_t bits;
-  std::memcpy(&bits, &v, sizeof bits);
-  return bits;
+  return bits32_of(v);
 }
 
 float Device::correction_deg(std::size_t joint) const {
-  constexpr float degrees = 57.29577951F;
   const ControlPublication& p = cycle_.publication();
   const std::atomic<std::uint32_t>& bits =
       joint < joints ? p.correction_rad[joint] : p.largest_correction_rad;

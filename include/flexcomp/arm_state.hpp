@@ -29,16 +29,14 @@ inline bool uncorrect(const Model<S, N, Cap>& model, const std::array<S, N>& q_r
   for (int n = 0; n < most_uncorrections; ++n) {
     compensate(model, q_command, context, settings, out);
     if ((out.flags & step_flag::refused) != 0) return false;
-    S greatest = S(0);
+    std::array<S, N> left;
     for (std::size_t i = 0; i < N; ++i) {
-      const S left = q_reading[i] - out.q[i];
-      q_command[i] += left;
+      left[i] = q_reading[i] - out.q[i];
+      q_command[i] += left[i];
       // An iterate may pass a limit that the solution respects.
       clamp_to(q_command[i], model.lower(i), model.upper(i));
-      const S size = left < S(0) ? -left : left;
-      if (size > greatest) greatest = size;
     }
-    if (greatest <= tolerance) return (out.flags & (step_flag::limited | step_flag::at_limit)) == 0;
+    if (greatest_of(left) <= tolerance) return (out.flags & (step_flag::limited | step_flag::at_limit)) == 0;
   }
   return false;
 }

@@ -26,6 +26,20 @@ inline double double_of(std::uint64_t b) {
   return v;
 }
 
+/// Bits of a float.
+inline std::uint32_t bits32_of(float v) {
+  std::uint32_t b;
+  std::memcpy(&b, &v, sizeof b);
+  return b;
+}
+
+/// A float from its bits.
+inline float float_of(std::uint32_t b) {
+  float v;
+  std::memcpy(&v, &b, sizeof v);
+  return v;
+}
+
 namespace detail {
 
 /// binary64 bits to the nearest float (ties to even), in integer arithmetic: an M4F has no double unit, and

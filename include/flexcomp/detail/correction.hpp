@@ -71,7 +71,7 @@ class Correction {
       : model_(model), context_(context), settings_(settings), rate_(rate) {}
 
   /// Corrected command for the command q (rad), in place; rate() may follow where the rate of the command (rad/s) is
-  /// given. Work: at most 9 chain passes, 2 factorisations, 20 linear solutions and 7 evaluations of the effects.
+  /// given. Work: at most 8 chain passes, 2 factorisations, 29 linear solutions and 7 evaluations of the effects.
   void run(std::array<S, N>& q) {
     undo_constant_terms(q);
     const CyclePlan<S, N, Cap>& plan = model_.plan();
@@ -91,8 +91,8 @@ class Correction {
   }
 
   /// Rate of the readings (rad/s) for the command's rate (C22), the derivative of what run() gave as q where nothing was
-  /// given up; context and set stand still. Work: at most 9 chain
-  /// passes, 20 linear solutions, 8 evaluations of the effects.
+  /// given up; context and set stand still. Work: at most 9 chain passes, 20 linear solutions, 8 evaluations of the
+  /// effects.
   FLEXCOMP_RARE void rate(const std::array<S, N>& q, std::array<S, N>& out) {
     // J of the chain as it stands, linear in the rates.
     std::array<S, N> turn;
@@ -154,10 +154,7 @@ class Correction {
     turn_chain();
     FlangePose<S> flange;
     Vec3<S> point;
-    pass(flange);
-    flange_point(flange, tool_point_, point);
-    shift = target_point_ - point;
-    rotation_error(target_axes_, flange.axes, turn);
+    chain_rest(flange, point, shift, turn);
     return dot(target_axes_.a, flange.axes.a) + dot(target_axes_.b, flange.axes.b) +
            dot(target_axes_.c, flange.axes.c);
   }
@@ -169,7 +166,7 @@ class Correction {
 
  private:
   void take_load() {
-    loaded_ = model_.plan().needs_loads();
+    loaded_ = model_.needs_loads();
     moves_ = model_.plan().size(group::move) != 0;
     if (loaded_) static_load(model_, context_, load_);
     linear_ = loaded_ && load_.is_plain;
@@ -274,6 +271,14 @@ class Correction {
     }
   }
 
+  /// Flange and tool point of a pass, and what they miss of the target (C5): position, m, and orientation, rad.
+  void chain_rest(FlangePose<S>& flange, Vec3<S>& point, Vec3<S>& shift, Vec3<S>& turn) {
+    pass(flange);
+    flange_point(flange, tool_point_, point);
+    shift = target_point_ - point;
+    rotation_error(target_axes_, flange.axes, turn);
+  }
+
   /// Factors the Jacobian of solver_.joints() at the tool point.
   void factor(const Vec3<S>& tool) {
     if (!solver_.set(tool, region_)) solver_.set_damped(region_);
@@ -286,13 +291,9 @@ class Correction {
     const S tolerance = Tolerance<S>::joint_rad * Tolerance<S>::joint_rad;
     for (int k = first;; ++k) {
       FlangePose<S> flange;
-      pass(flange);
-      Vec3<S> point;
-      flange_point(flange, tool_point_, point);
+      Vec3<S> point, shift, turn;
+      chain_rest(flange, point, shift, turn);
       if (linear_ && first == 1) linearise(flange);
-      Vec3<S> shift = {target_point_.x - point.x, target_point_.y - point.y, target_point_.z - point.z};
-      Vec3<S> turn;
-      rotation_error(target_axes_, flange.axes, turn);
       // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some percent:
       // from there on the Jacobian of this chain is used, which is close to that of the solution.
       if (!fresh_ && (solver_.is_damped() || solver_.jacobian_is_stale(turned_))) {
@@ -375,11 +376,9 @@ class Correction {
       if (!moves_) continue;
       angle_ = chain;
       FlangePose<S> flange;
-      Vec3<S> point, turn;
-      pass(flange);
-      flange_point(flange, tool_point_, point);
-      rotation_error(target_axes_, flange.axes, turn);
-      rest.linear = rest.linear + (target_point_ - point) * weight;
+      Vec3<S> point, shift, turn;
+      chain_rest(flange, point, shift, turn);
+      rest.linear = rest.linear + shift * weight;
       rest.angular = rest.angular + turn * weight;
     }
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the control cycle needs of a prepared model beside its chain: effects sorted by the kernel that evaluates them,
-/// first-order motions of the constant terms, slopes (docs/compensation.md, section 2).
+/// first-order motions of the constant terms, reach (docs/compensation.md, section 2).
 #ifndef FLEXCOMP_DETAIL_CYCLE_PLAN_HPP
 #define FLEXCOMP_DETAIL_CYCLE_PLAN_HPP
 
@@ -20,12 +20,11 @@ namespace detail {
 
 /// Groups of effects by the kernel that evaluates them. The first `count` are lists of a plan, in this order.
 namespace group {
-constexpr std::uint8_t lever = 0;  ///< turns a joint by link weight, (M13)
-constexpr std::uint8_t loaded =
-    1;                           ///< turns a joint by another load torque or moment, cubed, or times a curve
-constexpr std::uint8_t own = 2;  ///< turns a joint by that joint's own reading, (C14)
-constexpr std::uint8_t other = 3;  ///< turns a joint by other readings and the context
-constexpr std::uint8_t move = 4;   ///< moves a link, the base or the tool
+constexpr std::uint8_t lever = 0;   ///< turns a joint by link weight, (M13)
+constexpr std::uint8_t loaded = 1;  ///< turns a joint by another torque or moment, cubed, or times a curve
+constexpr std::uint8_t own = 2;     ///< turns a joint by that joint's own reading, (C14)
+constexpr std::uint8_t other = 3;   ///< turns a joint by other readings and the context
+constexpr std::uint8_t move = 4;    ///< moves a link, the base or the tool
 constexpr std::uint8_t count = 5;
 constexpr std::uint8_t own_compliance = 6;  ///< added up in one coefficient for each joint, (M12)
 constexpr std::uint8_t none = 7;            ///< moves what is measured, not the arm
@@ -85,8 +84,6 @@ class CyclePlan {
   }
   /// Compliance of joint i (from 0) to its own load torque (M12), rad/(N·m); the sum of all such terms.
   S compliance(std::size_t i) const { return compliance_[i]; }
-  /// True where some effect follows load torques, link weight or moments.
-  bool needs_loads() const { return needs_loads_; }
   /// True where some effect follows a moment on a link or the base.
   bool needs_moments() const { return needs_moments_; }
   S inverse_gravity() const { return inverse_gravity_; }  ///< s^2/m; 0 without gravity
@@ -105,12 +102,11 @@ class CyclePlan {
   template <class Model>
   FLEXCOMP_RARE void sort(const Model& model) {
     for (S& c : compliance_) c = S(0);
-    needs_loads_ = needs_moments_ = false;
+    needs_moments_ = false;
     std::array<std::uint8_t, Cap::terms> group_of{};
     for (std::size_t k = 0; k < model.effect_count(); ++k) {
       const Term<S>& t = model.effect(k);
       group_of[k] = effect_group<N>(t);
-      if (flexcomp::needs_loads(t.basis, t.factor)) needs_loads_ = true;
       if (is_moment(t.basis)) needs_moments_ = true;
       if (group_of[k] == group::own_compliance) compliance_[t.joint] += t.coefficient;
     }
@@ -177,7 +173,6 @@ class CyclePlan {
   Matrix3<S> tool_turn_ = Matrix3<S>::Identity();
   std::array<Count, group::count> end_{};
   std::array<Count, Cap::terms> order_{};
-  bool needs_loads_ = false;
   bool needs_moments_ = false;
 };
 

@@ -32,6 +32,7 @@ struct StaticLoad {
   Vec3<S> total_force() const { return gravity * mass_kg + force_n; }
 };
 
+/// Loads of a context, with the model's change of the payload.
 template <class S, std::size_t N, class Cap>
 inline void static_load(const Model<S, N, Cap>& model, const Context<S, N>& context, StaticLoad<S>& load) {
   const std::array<S, 4>& edit = model.load_edit();
