@@ -63,15 +63,12 @@ namespace detail {
     if (rest > 0x10000000U || (rest == 0x10000000U && (out & 1U) != 0)) ++out;
   }
   out |= sign;
-  float v;
-  std::memcpy(&v, &out, sizeof v);
-  return v;
+  return float_of(out);
 }
 
 /// float to the same value as binary64 bits, in integer arithmetic (subnormal floats become zero).
 [[gnu::noinline]] inline std::uint64_t bits_from_float(float v) {
-  std::uint32_t b;
-  std::memcpy(&b, &v, sizeof b);
+  const std::uint32_t b = bits32_of(v);
   const std::uint64_t sign = static_cast<std::uint64_t>(b & 0x80000000U) << 32U;
   const std::uint32_t exponent = (b >> 23U) & 0xFFU;
   const std::uint64_t fraction = static_cast<std::uint64_t>(b & 0x7FFFFFU) << 29U;
@@ -149,8 +146,7 @@ inline S load_scalar(const std::uint8_t* p) {
 inline bool is_finite(double v) { return (bits_of(v) & 0x7FF0000000000000ULL) != 0x7FF0000000000000ULL; }
 /// is_finite() of a binary32.
 inline bool is_finite(float v) {
-  std::uint32_t b;
-  std::memcpy(&b, &v, sizeof b);
+  const std::uint32_t b = bits32_of(v);
   return (b & 0x7F800000U) != 0x7F800000U;
 }
 
