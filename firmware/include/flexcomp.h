@@ -406,12 +406,14 @@ flexcomp_status flexcomp_step_rate(flexcomp_arm* fc, const flexcomp_real q_comma
 
 /** What the last step did. */
 typedef struct flexcomp_diagnostics {
-  uint32_t struct_size;               /**< in: sizeof(flexcomp_diagnostics) */
-  uint32_t cycles;                    /**< since the start; wraps */
-  uint32_t cycles_by_status[6];       /**< the same by flexcomp_status; wrap */
-  flexcomp_status status;             /**< of the last step */
-  uint32_t flags;                     /**< of the last step, bits of flexcomp_step_flag */
-  flexcomp_real remaining_position_m; /**< error of the tool that its last iterate leaves; 0 without a set */
+  uint32_t struct_size;         /**< in: sizeof(flexcomp_diagnostics) */
+  uint32_t cycles;              /**< since the start; wraps */
+  uint32_t cycles_by_status[6]; /**< the same by flexcomp_status; wrap */
+  flexcomp_status status;       /**< of the last step */
+  uint32_t flags;               /**< of the last step, bits of flexcomp_step_flag */
+  flexcomp_real
+      remaining_position_m; /**< error of the tool, not less than the true one: what the last iterate leaves,
+                                           and what offset and rate hold back; 0 without a set or where refused */
   flexcomp_real remaining_orientation_rad;       /**< the same of its orientation */
   flexcomp_real correction_rad[FLEXCOMP_JOINTS]; /**< output less command */
   flexcomp_real offset_rad[FLEXCOMP_JOINTS];     /**< the part of it that an event left; exactly 0 without */
@@ -419,8 +421,7 @@ typedef struct flexcomp_diagnostics {
 } flexcomp_diagnostics;
 
 /** Fills the diagnostics of the last step. 0, and nothing is written, where struct_size is not
- * sizeof(flexcomp_diagnostics). The remaining errors are those of the set's answer: offset and rate come on top.
- * CYCLE, after the step; small. */
+ * sizeof(flexcomp_diagnostics). CYCLE, after the step; small. */
 int flexcomp_get_diagnostics(const flexcomp_arm* fc, flexcomp_diagnostics* diagnostics);
 
 /* --- at joint readings ----------------------------------------------------------------------------

@@ -159,8 +159,6 @@ bool ControlCycle::finish(const Input& input, const Joints& q_command_rad, const
     out.flags = has_set ? std::uint16_t{0} : step_flag::no_set;
     if (!input.is_finite || !is_within_limits(q_command_rad)) out.flags |= step_flag::refused;
   }
-  remaining_position_ = out.remaining_position_m;
-  remaining_orientation_ = out.remaining_orientation_rad;
 
   bool jumped = false;
   bool is_used = true;
@@ -189,6 +187,8 @@ bool ControlCycle::finish(const Input& input, const Joints& q_command_rad, const
   } else {
     output_.hold(q_command_rad, out.q);
   }
+  remaining_position_ = out.remaining_position_m;
+  remaining_orientation_ = out.remaining_orientation_rad;
   out.status = summary(out.flags);
   publish(out, input.model);
   return event;

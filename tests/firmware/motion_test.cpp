@@ -251,7 +251,44 @@ struct Passes {
   long farther = 0;           ///< of these: off by more than the larger of the two errors
   double farther_by_m = 0;    ///< at most
   double farther_by_rad = 0;  ///< orientation
+  long avoidable = 0;         ///< of the farther: some output within the rates would have been no farther
 };
+
+/// True where some correction within the greatest rate of `last` leaves at most `allowed_m` and `allowed_rad` of
+/// error at `q`: coordinate descent on the excess, whose residual is linear over so short a way.
+bool some_output_is_near(const FirmwareModel& model, const Joints& q, const FirmwareContext& context,
+                         const Joints& last, const Joints& from, double allowed_m, double allowed_rad) {
+  constexpr Scalar rate = Scalar(2e-3);
+  Joints c{};
+  for (std::size_t j = 0; j < joints; ++j) c[j] = from[j] - q[j];
+  const auto excess = [&](const Joints& correction) {
+    Joints out{};
+    for (std::size_t j = 0; j < joints; ++j) out[j] = q[j] + correction[j];
+    const RemainingError e = remaining_error(model, out, q, context);
+    return std::max(static_cast<double>(e.position_m) / allowed_m,
+                    static_cast<double>(e.orientation_rad) / allowed_rad);
+  };
+  double best = excess(c);
+  std::mt19937_64 random(7);
+  double width = 2e-3;
+  for (int k = 0; k < 4000 && best > 1; ++k) {
+    Joints next = c;
+    for (std::size_t j = 0; j < joints; ++j) {
+      const double v = static_cast<double>(c[j]) + std::normal_distribution<double>(0, width)(random);
+      next[j] = real(std::clamp(v, static_cast<double>(last[j] - rate), static_cast<double>(last[j] + rate)));
+    }
+    const double value = excess(next);
+    if (value < best) {
+      best = value;
+      c = next;
+      width *= 1.5;
+    } else {
+      width = std::max(1e-6, width * 0.95);
+    }
+    if (k % 500 == 499) width = 1e-3;
+  }
+  return best <= 1;
+}
 
 Passes passes_through_singularities(double steepest, int count) {
   Passes result;
@@ -290,6 +327,7 @@ Passes passes_through_singularities(double steepest, int count) {
       for (std::size_t j = 0; j < joints; ++j) q[j] = real(middle[j] + k * speed / longest * step[j]);
       constexpr unsigned under_way = step_flag::settling | step_flag::rate_limited;
       for (int wait = 0; k == -half && wait < 3000 && (arm.step(q).flags & under_way) != 0;) ++wait;
+      const Joints last = arm.device->cycle().output().correction();
       const StepResult r = arm.step(q);
       ++result.cycles;
       if ((r.flags & step_flag::rate_limited) == 0) continue;
@@ -303,16 +341,22 @@ Passes passes_through_singularities(double steepest, int count) {
       const double by_m = static_cast<double>(out.position_m - std::max(none.position_m, all.position_m));
       const double by_rad =
           static_cast<double>(out.orientation_rad - std::max(none.orientation_rad, all.orientation_rad));
-      if (by_m > 0) ++result.farther;
+      if (by_m > 0) {
+        ++result.farther;
+        if (some_output_is_near(*model, q, context, last, r.q,
+                                static_cast<double>(std::max(none.position_m, all.position_m)),
+                                static_cast<double>(std::max(none.orientation_rad, all.orientation_rad))))
+          ++result.avoidable;
+      }
       result.farther_by_m = std::max(result.farther_by_m, by_m);
       result.farther_by_rad = std::max(result.farther_by_rad, by_rad);
     }
   }
   std::printf(
       "steepest %.0f: %ld cycles, %ld rate-limited, %ld of them farther off than either, by up to "
-      "%.2f mm (orientation %.1f mrad)\n",
+      "%.2f mm (orientation %.1f mrad), %ld avoidable\n",
       steepest, result.cycles, result.rate_limited, result.farther, result.farther_by_m * 1e3,
-      result.farther_by_rad * 1e3);
+      result.farther_by_rad * 1e3, result.avoidable);
   return result;
 }
 
@@ -326,6 +370,8 @@ TEST(Motion, WhileTheRateActs) {
   const Passes usual = passes_through_singularities(100, count);
   EXPECT_LE(usual.farther, usual.rate_limited / 25);
   EXPECT_LE(usual.rate_limited, usual.cycles / 70);
+  // Most of it nobody could avoid who does not know the program ahead.
+  EXPECT_LE(usual.avoidable, usual.farther / 4);
   const Passes gentle = passes_through_singularities(20, count);
   EXPECT_GT(gentle.rate_limited, 0);
   EXPECT_EQ(gentle.farther, 0);

@@ -15,6 +15,9 @@
 
 static uint64_t next_cycle;
 
+/* Control periods that could not be served since the start; for a debugger. */
+volatile uint32_t board_periods_left_out;
+
 /* PMCR: count, from zero, every cycle; PMCNTENSET: the cycle counter. */
 static void start_counter(void) {
   __asm__ volatile("mcr p15, 0, %0, c9, c12, 0" ::"r"(5U));
@@ -46,7 +49,10 @@ int board_cycle_due(void) {
   if (now < next_cycle) return 0;
   next_cycle += COUNTS_PER_CYCLE;
   /* More than a whole period late (an emulator on a busy machine): not made up for in a burst. */
-  if (next_cycle <= now) next_cycle = now + COUNTS_PER_CYCLE;
+  if (next_cycle <= now) {
+    board_periods_left_out += (uint32_t)((now - next_cycle) / COUNTS_PER_CYCLE) + 1U;
+    next_cycle = now + COUNTS_PER_CYCLE;
+  }
   return 1;
 }
 

@@ -99,7 +99,7 @@ class ControlCycle {
   /// of the cycle's until the next step.
   const FirmwareModel* current(FirmwareContext& context) const;
 
-  /// Error that the last step leaves, as its last iterate shows it. Of the cycle.
+  /// Error that the last step left, with what the output stage held back; 0 where refused. Of the cycle.
   Scalar remaining_position_m() const { return remaining_position_; }
   /// The same of orientation.
   Scalar remaining_orientation_rad() const { return remaining_orientation_; }
