@@ -178,6 +178,7 @@ typedef struct flexcomp_admission {
   flexcomp_real com_m;   /**< its greatest distance from the flange; negative: twice the robot's, or 0.2 m */
   flexcomp_real force_n; /**< greatest external force; negative: none */
   flexcomp_real temperature_k; /**< greatest distance from the reference; negative: 30 K */
+  flexcomp_real link_slope;    /**< slope, of links, base and tool */
 } flexcomp_admission;
 
 /** Settings of an arm. flexcomp_settings_default() first, then what is to be different: flexcomp_init refuses
@@ -238,9 +239,12 @@ typedef struct flexcomp_storage {
 typedef enum flexcomp_init_error {
   FLEXCOMP_INIT_DONE = 0,   /**< it did not */
   FLEXCOMP_INIT_MEMORY = 1, /**< missing, too small or misaligned */
-  /** A number that is not finite, crossed limits, a quaternion off norm 1 by more than 1e-3, or no name. */
+  /** A number that is not finite, crossed limits or limits beyond 1e5 rad (float: 1e4), a negative payload, a quaternion off norm 1 by more
+   * than 1e-3, or no name. */
   FLEXCOMP_INIT_ROBOT = 2,
-  /** A period, rate, acceleration or slope that is not above 0, a slope above 200, or another struct_size. */
+  /** A number that is not finite (ranges excepted, which admission judges), a period, rate, acceleration, slope or plausible
+   * change that is not above 0, a slope above 200, a plausible turn above pi / 2, a largest correction or band below 0, another
+   * answer to a refusal, or another struct_size. */
   FLEXCOMP_INIT_SETTINGS = 3,
   FLEXCOMP_INIT_OTHER_SCALAR = 4,   /**< FLEXCOMP_SCALAR of program and library differ */
   FLEXCOMP_INIT_OTHER_CAPACITY = 5, /**< another value of flexcomp_config.h differs */
@@ -433,9 +437,9 @@ int flexcomp_get_diagnostics(const flexcomp_arm* fc, flexcomp_diagnostics* diagn
 /** Nominal command for joint readings (docs/compensation.md, C21): that which the active set corrects to
  * q_reading_rad. For the start, jogging, display and the following error; an offset that settles is not in it.
  * Nonzero where it is accurate to 1e-10 rad (float: 2e-6). 0, and the command as far as it came, where a number is
- * not finite (the reading comes back), beyond a joint limit, inside a singular region, or where the step would limit
- * the correction. Without a set the readings themselves. BOTH contexts; some six steps, 16 at most. In a cycle that
- * has no time for them: in the background. */
+ * not finite (the reading comes back), beyond a joint limit, inside a singular region, where the step would limit
+ * the correction, or where its rounds do not reach that accuracy. Without a set the readings themselves. BOTH
+ * contexts; some six steps, 16 at most. In a cycle that has no time for them: in the background. */
 int flexcomp_uncorrect(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
                        const flexcomp_context* context, flexcomp_real q_command_rad[FLEXCOMP_JOINTS]);
 

@@ -47,6 +47,8 @@ void begin_model(const Robot& robot, FirmwareModel& model) { model.begin(robot);
 
 void finish_chain(FirmwareModel& model) { model.finish_chain(); }
 
+void finish_bounds(FirmwareModel& model) { model.finish_bounds(); }
+
 void finish_size(FirmwareModel& model) { model.finish_size(); }
 
 }  // namespace firmware

@@ -149,7 +149,9 @@ bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
     const flexcomp_link& link = from.links[j];
     to.links[j] = {link.theta_rad, link.d_m, link.a_m, link.alpha_rad, link.beta_rad};
     to.limits[j] = {from.min_rad[j], from.max_rad[j]};
-    if (!(scalar(from.min_rad[j]) < scalar(from.max_rad[j]))) return false;
+    const fw::Scalar low = scalar(from.min_rad[j]), high = scalar(from.max_rad[j]);
+    const fw::Scalar most = flexcomp::LargestAngle<fw::Scalar>::value();
+    if (!(low < high && -most <= low && high <= most)) return false;
   }
   for (std::size_t k = 0; k < 3; ++k) {
     to.gravity_m_s2[k] = from.gravity_m_s2[k];
@@ -162,6 +164,7 @@ bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
     norm += scalar(from.tool_wxyz[k]) * scalar(from.tool_wxyz[k]);
   }
   to.payload_kg = from.payload_kg;
+  if (!(scalar(from.payload_kg) >= fw::Scalar(0))) return false;
   to.reference_temperature_c = from.reference_temperature_c;
   return norm > fw::Scalar(0.998F) && norm < fw::Scalar(1.002F);
 }
@@ -176,7 +179,16 @@ bool is_sensible(const flexcomp_settings& s) {
   for (const fw::Scalar rate : s.correction_rate_rad_s) {
     if (!is_above_zero(rate)) return false;
   }
-  return s.cycle_us != 0 && is_above_zero(s.offset_rate_rad_s) && is_above_zero(s.offset_acceleration_rad_s2);
+  // A C program may have put any number there, which no C++ enumeration may hold.
+  std::uint32_t on_refusal = 0;
+  static_assert(sizeof on_refusal >= sizeof s.on_refusal, "room for an enumeration of C");
+  std::memcpy(&on_refusal, &s.on_refusal, sizeof s.on_refusal);
+  const auto is_not_below_zero = [](fw::Scalar v) { return flexcomp::is_finite(v) && v >= fw::Scalar(0); };
+  return s.cycle_us != 0 && is_above_zero(s.offset_rate_rad_s) &&
+         is_above_zero(s.offset_acceleration_rad_s2) && is_not_below_zero(s.largest_correction_rad) &&
+         is_not_below_zero(s.direction_band_rad) && is_above_zero(s.plausible_position_m) &&
+         is_above_zero(s.plausible_orientation_rad) && s.plausible_orientation_rad < fw::Scalar(1.5707963F) &&
+         (on_refusal == FLEXCOMP_PASS_THROUGH || on_refusal == FLEXCOMP_HOLD_LAST_OUTPUT);
 }
 
 fw::FirmwareContext context_from(const flexcomp_context& from) {
@@ -280,9 +292,9 @@ void flexcomp_settings_default(flexcomp_settings* settings) {
   flexcomp_admission& a = settings->admission;
   const flexcomp::AdmissionLimits<fw::Scalar>& l = d.store.limits;
   const flexcomp::AdmissionRanges<fw::Scalar>& r = d.store.ranges;
-  a = {l.value_rad,    l.slope,      l.scale,    l.direction_rad, l.compliance_rad_per_nm,
-       l.rad_per_kg,   l.rad_per_n,  l.load_rad, l.rad_per_k,     l.total_slope,
-       l.instructions, r.payload_kg, r.com_m,    r.force_n,       r.temperature_k};
+  a = {l.value_rad, l.slope,    l.scale,         l.direction_rad, l.compliance_rad_per_nm, l.rad_per_kg,
+       l.rad_per_n, l.load_rad, l.rad_per_k,     l.total_slope,   l.instructions,          r.payload_kg,
+       r.com_m,     r.force_n,  r.temperature_k, l.link_slope};
 }
 
 flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_robot* robot,
@@ -328,9 +340,9 @@ flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_ro
   d.store.trial_cycles = s.trial_cycles;
   d.store.staging_timeout_ms = s.staging_timeout_ms;
   const flexcomp_admission& a = s.admission;
-  d.store.limits = {a.value_rad,   a.slope,     a.scale,    a.direction_rad, a.compliance_rad_per_nm,
-                    a.rad_per_kg,  a.rad_per_n, a.load_rad, a.rad_per_k,     a.total_slope,
-                    a.instructions};
+  d.store.limits = {a.value_rad,    a.slope,     a.scale,    a.direction_rad, a.compliance_rad_per_nm,
+                    a.rad_per_kg,   a.rad_per_n, a.load_rad, a.rad_per_k,     a.total_slope,
+                    a.instructions, a.link_slope};
   d.store.ranges = {a.payload_kg, a.com_m, a.force_n, a.temperature_k};
   d.name = robot->name;
   return reinterpret_cast<flexcomp_arm*>(new (memory) Arm(nominal, storage != nullptr ? *storage : none, d));

@@ -224,6 +224,10 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       r = check_counts(header_, cursor_);
       if (r != Refusal::none) return true;
       finish_chain(model);
+      check_ = Check::derivatives;
+      return false;
+    case Check::derivatives:
+      finish_bounds(model);
       check_ = Check::size;
       return false;
     case Check::size:

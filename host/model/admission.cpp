@@ -81,6 +81,15 @@ HostCertificate certified(const TermSet& set, const Robot& robot, const std::str
                      fmt::format("a step of at most {} instructions on a Cortex-M7", limits.instructions),
                      fmt::format("terms that take {}", detail));
   }
+  if (refusal == Refusal::implausible) {
+    const Excess<double>& e = admission.excess();
+    const bool is_length = e.limit == LargestConstant<double>::m;
+    throw InputError(
+        source, 0, place_name(admission.constant()),
+        is_length ? fmt::format("a constant of at most {:.0f} mm", e.limit * 1e3)
+                  : fmt::format("a constant of at most {:.3g} deg", degrees(e.limit)),
+        is_length ? fmt::format("{:.6g} mm", e.bound * 1e3) : fmt::format("{:.6g} deg", degrees(e.bound)));
+  }
   const std::string effect = effect_at(set, robot, detail);
   if (refusal == Refusal::not_allowed_covariate) {
     throw InputError(source, 0, effect, "readings, loads, temperature or direction, which a controller knows",

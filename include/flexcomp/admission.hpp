@@ -53,6 +53,8 @@ struct AdmissionLimits {
   S rad_per_k = S(5e-5);                ///< Measure::per_k, and any coefficient of thermal growth (1/K)
   S total_slope = S(0.5);               ///< Measure::total_slope
   std::uint32_t instructions = 100000;  ///< of one step, by step_instructions()
+  S link_slope =
+      S(0.025);  ///< Measure::slope off the joints: near a singularity the arm follows it many times over
 
   /// The limit of one measure; measures that have none are not asked for.
   S of(Measure m) const {
@@ -79,6 +81,14 @@ struct AdmissionLimits {
         return total_slope;
     }
   }
+};
+
+/// Greatest constant terms, m and rad: those of an arm that was built and mastered by mistake are smaller, and the steps of
+/// this library are not derived for larger ones.
+template <class S>
+struct LargestConstant {
+  static constexpr S m = S(0.05);
+  static constexpr S rad = S(0.1);
 };
 
 /// What the context may say, as the integrator declares it. A load beyond it may move the arm by more than the
@@ -178,7 +188,7 @@ struct Path {
 /// Sets whose terms all turn joints: at most seven evaluations.
 constexpr Path joints_only = {15800, 7500, 3500, 0, {0, 1000, 340, 1350, 900, 1150, 1700, 350, 250, 220, 40}};
 /// Sets that also move links, base or tool: at most six evaluations, each with the chain.
-constexpr Path off_joints = {28500, 7500, 0, 6000, {0, 1130, 620, 1400, 1245, 1390, 1900, 545, 250, 220, 40}};
+constexpr Path off_joints = {28500, 7500, 0, 6000, {0, 1130, 620, 1400, 1245, 1450, 1900, 545, 250, 220, 40}};
 
 /// True where the term turns the joint whose reading it follows.
 template <class S>
@@ -312,7 +322,8 @@ class Admission {
     return next_ < model.effect_count() && model.effect(next_).table != no_table;
   }
 
-  /// Fills the certificate; the verdict. `detail` is the term's index, or the number of instructions.
+  /// Fills the certificate; the verdict. `detail` is the term's index, or the number of instructions, or the size of a
+  /// constant in um or urad.
   template <class Cap>
   Refusal finish(const Model<S, N, Cap>& model, Certificate<S, N>& out, std::uint32_t& detail) {
     const auto at = [this](std::size_t place, Measure m) { return sum_[place][static_cast<std::size_t>(m)]; };
@@ -339,7 +350,9 @@ class Admission {
     out.reach_m = reach_;
     out.instructions = step_instructions(model);
     detail = 0;
-    if (refusal_ != Refusal::none) {
+    if (refusal_ == Refusal::implausible) {
+      detail = excess_.bound < S(4000) ? static_cast<std::uint32_t>(excess_.bound * S(1e6)) : 0xFFFFFFFFU;
+    } else if (refusal_ != Refusal::none) {
       detail = static_cast<std::uint32_t>(excess_.term);
     } else if (out.instructions > limits_.instructions) {
       refusal_ = Refusal::too_costly;
@@ -349,6 +362,7 @@ class Admission {
   }
 
   const Excess<S>& excess() const { return excess_; }  ///< of a refused set, unless it is too costly
+  Place constant() const { return constant_; }         ///< of a set that is refused as implausible
 
  private:
   using Share = std::array<S, measure_count>;
@@ -421,10 +435,22 @@ class Admission {
   void add_constants(const Model<S, N, Cap>& model) {
     for (std::uint8_t s = 0; s < 6; ++s) {
       for (std::size_t i = 0; i < N; ++i)
-        add_size({static_cast<std::uint8_t>(i + 1), s}, magnitude(model.constant(i)[s]));
-      add_size({body::base, s}, magnitude(model.base()[s]));
-      add_size({body::tool, s}, magnitude(model.tool()[s]));
+        add_constant({static_cast<std::uint8_t>(i + 1), s}, magnitude(model.constant(i)[s]));
+      add_constant({body::base, s}, magnitude(model.base()[s]));
+      add_constant({body::tool, s}, magnitude(model.tool()[s]));
     }
+    if (refusal_ != Refusal::none) next_ = model.effect_count();
+  }
+
+  /// Each by itself: what cancels at the tool moves the arm all the same.
+  void add_constant(Place p, const S& size) {
+    add_size(p, size);
+    const S most = is_length(p) ? LargestConstant<S>::m : LargestConstant<S>::rad;
+    if (size <= most || refusal_ != Refusal::none) return;
+    refusal_ = Refusal::implausible;
+    excess_.bound = size;
+    excess_.limit = most;
+    constant_ = p;
   }
 
   /// Greatest value of a torque or moment and its derivatives, over all poses.
@@ -542,7 +568,8 @@ class Admission {
         put(share, Measure::per_k, k * steepest);
         return true;
       case Covariate::direction:
-        put(share, Measure::direction, k * widest * S(0.5));
+        // As steep as backlash of this size, whose direction goes from -1 to 1.
+        put(share, Measure::direction, k * (steepest > widest * S(0.5) ? steepest : widest * S(0.5)));
         return true;
       case Covariate::time:
       case Covariate::relative_speed:
@@ -622,7 +649,11 @@ class Admission {
       }
       case Basis::sine:
       case Basis::cosine: {
-        const S slope = k * magnitude(t.argument);
+        const S low = magnitude(model.lower(t.joint)), high = magnitude(model.upper(t.joint));
+        S slope = k * magnitude(t.argument);
+        // Beyond the range of sin_cos() there is no value at all.
+        const S farthest = magnitude(t.argument) * ((low > high ? low : high) + S(1));
+        if (!(farthest <= LargestAngle<S>::value())) slope = S(1e9F);
         put(share, Measure::value, k);
         put(share, Measure::deflection, k);
         put(share, Measure::slope, slope);
@@ -687,12 +718,16 @@ class Admission {
     put(share, Measure::total_slope, slope * most);
   }
 
+  S limit_of(Measure m, std::size_t place) const {
+    return place == N && m == Measure::slope ? limits_.link_slope : limits_.of(m);
+  }
+
   void add(std::size_t place, const Share& share) {
     for (std::size_t m = 0; m < measure_count; ++m) {
       S& sum = sum_[place][m];
       sum += share[m];
       const Measure measure = static_cast<Measure>(m);
-      if (m < limited_measures && refusal_ == Refusal::none && !(sum <= limits_.of(measure)))
+      if (m < limited_measures && refusal_ == Refusal::none && !(sum <= limit_of(measure, place)))
         refuse(measure, place, sum);
     }
   }
@@ -717,7 +752,7 @@ class Admission {
     excess_.measure = m;
     excess_.place = place;
     excess_.bound = bound;
-    excess_.limit = limits_.of(m);
+    excess_.limit = limit_of(m, place);
   }
 
   void search(std::size_t k, std::size_t place, const Share& share) {
@@ -737,6 +772,7 @@ class Admission {
   S payload_ = S(0), gravity_ = S(0), weight_ = S(0), force_ = S(0), temperature_ = S(0);
   S position_ = S(0), orientation_ = S(0), stretch_ = S(0);
   Excess<S> excess_{};
+  Place constant_{};
   S greatest_ = S(-1);
   Refusal refusal_ = Refusal::none;
   bool searching_ = false;

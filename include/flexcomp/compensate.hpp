@@ -139,8 +139,9 @@ inline bool compensate_rate(const Model<S, N, Cap>& model, const std::array<S, N
       out.flags != 0) {
     return false;
   }
-  correction.rate(q, q_rate);
-  return true;
+  if (correction.rate(q, q_rate)) return true;
+  q_rate = q_rate_command;
+  return false;
 }
 
 /// compensate() by value.

@@ -182,9 +182,10 @@ class Model {
   }
 
   /// Adds up the constant terms and plans the control cycle. Called once, after the last add(). A controller that may not
-  /// stay away long calls its two parts, finish_chain() and finish_size().
+  /// stay away long calls its parts, finish_chain(), finish_bounds() and finish_size().
   void finish() {
     finish_chain();
+    finish_bounds();
     finish_size();
   }
   /// First part of finish().
@@ -204,6 +205,8 @@ class Model {
     plan_.set(*this);
   }
   /// Second part of finish().
+  void finish_bounds() { plan_.bound_derivatives(*this); }
+  /// Third part of finish().
   void finish_size() { tool_motion_ = detail::tool_motion_of(*this); }
 
   /// begin(), all tables and terms of a list, finish(); the first refusal ends it.

@@ -86,20 +86,25 @@ FLEXCOMP_RARE ToolMotion<typename M::Scalar> tool_motion_of(const M& model) {
       if (abs(values[v]) > greatest[k]) greatest[k] = abs(values[v]);
     }
   }
+  ToolMotion<S> motion;
   std::array<S, n> turn_of{};
   for (std::size_t k = 0; k < model.effect_count(); ++k) {
     const auto& t = model.effect(k);
-    if (t.place.body < 1 || t.place.body > n || t.place.slot != slot::theta) continue;
-    S& turn = turn_of[t.place.body - 1U];
+    if (t.place.body < 1 || t.place.body > n) continue;
+    S size = S(0);
     if (t.basis == Basis::link_weight || t.basis == Basis::sine || t.basis == Basis::cosine)
-      turn += abs(t.coefficient);
-    if (t.basis == Basis::curve && t.factor == Factor::one) turn += abs(t.coefficient) * greatest[t.table];
+      size = abs(t.coefficient);
+    if (t.basis == Basis::curve && t.factor == Factor::one) size = abs(t.coefficient) * greatest[t.table];
+    if (t.place.slot == slot::d || t.place.slot == slot::a) {
+      motion.position_m += size;
+    } else {
+      turn_of[t.place.body - 1U] += size;
+    }
   }
   const auto& tool = model.nominal_tool().position;
   S reach = length(tool[0], tool[1], tool[2]);
   S arm = length(from_binary64<S>(robot.payload_com_m[0]), from_binary64<S>(robot.payload_com_m[1]),
                  from_binary64<S>(robot.payload_com_m[2]));
-  ToolMotion<S> motion;
   for (std::size_t i = n; i-- > 0;) {
     const auto& twist = model.plan().link_twist(i);
     S turn = length(twist.angular.x, twist.angular.y, twist.angular.z);

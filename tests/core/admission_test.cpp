@@ -203,6 +203,52 @@ TEST(Admission, OffTheJointsLengthsCountByTheReach) {
   EXPECT_EQ(refusal_of_last(robot, set), Refusal::too_large);
 }
 
+// A dither about a node must not throw the arm.
+TEST(Admission, AGridMayNotBeSteepOverTheDirection) {
+  const arms::Robot robot = arms::tx60l();
+  for (const double node : {1e-9, 0.5}) {
+    TermSet<double> set = paper_set();
+    const std::uint16_t table = set.add_grid({-1, 1}, {0, node}, {0, 9e-4, 0, 9e-4});
+    set.tables.back().column_covariate = Covariate::direction;
+    set.add(on_link(2, slot::theta), Basis::grid, 1).table = table;
+    EXPECT_EQ(refusal_of_last(robot, set), Refusal::too_large) << node;
+  }
+}
+
+TEST(Admission, AWaveStaysWithinTheRangeOfItsSine) {
+  const arms::Robot robot = arms::tx60l();
+  TermSet<double> set = paper_set();
+  set.add(on_link(3, slot::theta), Basis::sine, 1e-6, 2, 41559);
+  EXPECT_EQ(refusal_of_last(robot, set), Refusal::too_steep);
+}
+
+// d of parallel axes: the tool stays where it is, and the arm is none.
+TEST(Admission, ConstantsThatCancelAreRefused) {
+  const arms::Robot robot = arms::tx60l();
+  for (const double size : {0.06, 1e12}) {
+    TermSet<double> set;
+    set.add(on_link(2, slot::d), Basis::one, size);
+    set.add(on_link(3, slot::d), Basis::one, -size);
+    const auto v = verdict_on(robot, set);
+    EXPECT_EQ(v.refusal, Refusal::implausible);
+    EXPECT_EQ(v.detail, size < 1 ? 60000U : 0xFFFFFFFFU);
+  }
+  TermSet<double> turned;
+  turned.add({flexcomp::body::base, slot::rz}, Basis::one, 3);
+  turned.add(on_link(1, slot::theta), Basis::one, -3);
+  EXPECT_EQ(verdict_on(robot, turned).refusal, Refusal::implausible);
+}
+
+// What moves links moves the wrist many times over near its singularity.
+TEST(Admission, LinksMayNotMoveSteeply) {
+  const arms::Robot robot = arms::tx60l();
+  TermSet<double> set = paper_set();
+  set.add(on_link(4, slot::alpha), Basis::sine, 2e-3, 3, 4);
+  EXPECT_EQ(verdict_on(robot, set).refusal, Refusal::none);
+  set.terms.back().argument = 50;
+  EXPECT_EQ(refusal_of_last(robot, set), Refusal::too_steep);
+}
+
 TEST(Admission, AdmitsThePapersSetOnEveryArm) {
   for (const arms::Arm& arm : arms::all()) {
     arms::Random random(5);

@@ -325,4 +325,57 @@ TEST(JointDeflection, WhatDoesNotConvergeIsNotOk) {
   EXPECT_GT(said, 0);
 }
 
+// A harmonic at its inflection, onto which another one shifts it: neither slope nor curvature show that there is more.
+TEST(JointDeflection, AnOwnHarmonicAtItsInflectionIsFound) {
+  const arms::Robot robot = arms::tx60l();
+  const auto context = flexcomp::default_context<double>(robot);
+  struct Case {
+    double first, order, size;
+  };
+  for (const Case c : {Case{5e-3, 101, 1e-4}, {0.01, 101, 2e-4}, {0.01, 300, 5e-4}, {0.018, 300, 3e-4}}) {
+    arms::TermSet<double> set;
+    set.add(arms::on_link(6, slot::theta), Basis::sine, c.first, 5, 1);
+    set.add(arms::on_link(6, slot::theta), Basis::sine, c.size, 5, c.order);
+    const auto model = arms::prepared(robot, set);
+    Joints q = {0.3, 0.4, 1, 0.5, 0.8, 0.2};
+    double worst = 0;
+    int ok = 0;
+    constexpr int count = 20000;
+    for (int n = 0; n < count; ++n) {
+      q[5] = 0.2 + 2 * flexcomp::pi / c.order * n / count;
+      const auto r = flexcomp::compensate(model, q, context);
+      if (r.status != flexcomp::StepStatus::ok) continue;
+      ++ok;
+      worst = std::max(worst, flexcomp::target_residual(model, r.q, q, context).orientation_rad);
+    }
+    EXPECT_EQ(ok, count);
+    EXPECT_LE(worst, 1e-9) << c.order;
+  }
+}
+
+// The first step of the fixed point may be small although the slope is not.
+TEST(JointDeflection, SteepMovesOfLinksAreReachedWhereItSaysOk) {
+  const arms::Robot robot = arms::tx60l();
+  const auto context = flexcomp::default_context<double>(robot);
+  arms::Random random(39);
+  for (const double order : {10.0, 50.0}) {
+    arms::TermSet<double> set;
+    set.add(arms::on_link(4, slot::alpha), Basis::sine, 4e-3, 3, order);
+    const auto model = arms::prepared(robot, set);
+    double worst = 0, beyond = 0;
+    for (int n = 0; n < 40000 / part; ++n) {
+      const Joints q = random.pose(robot);
+      const auto r = flexcomp::compensate(model, q, context);
+      const auto left = flexcomp::target_residual(model, r.q, q, context);
+      if (r.status == flexcomp::StepStatus::ok)
+        worst = std::max({worst, left.position_m, left.orientation_rad});
+      beyond = std::max(beyond, left.orientation_rad - 1.05 * r.remaining_orientation_rad);
+    }
+    std::printf("[ measured ] order %.0f: %.1e where ok; beyond what is said %.1e rad\n", order, worst,
+                beyond);
+    EXPECT_LE(worst, 1e-6) << order;
+    EXPECT_LE(beyond, 2e-7) << order;
+  }
+}
+
 }  // namespace

@@ -3,6 +3,7 @@
 // slope_search does.
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -50,6 +51,21 @@ TEST(Slope, OfASmallAndALargeSet) {
   expect_gentle(100, 0.08, 0.2);
   // Three times the errors make the regions three times as large, in squares.
   expect_gentle(100, 0.12, 3);
+}
+
+// The wrist follows the link that follows the wrist.
+TEST(Slope, OfSetsThatMoveLinks) {
+  for (const arms::Arm& arm : arms::six()) {
+    for (const auto& [size, order] : {std::pair{1e-4, 1.0}, {5e-4, 1.0}, {2e-3, 1.0}, {1e-3, 8.0}}) {
+      const slopes::Subject s = slopes::with_wobble(arm, size, order);
+      arms::Random random(63);
+      slopes::Found found{0, {}};
+      for (int n = 0; n < 20 / arms::part; ++n) slopes::climb(s, random, slopes::step_rad, found);
+      std::printf("[ measured ] %s, wobble %g rad, order %g: slope %.1f\n", arm.name, size, order,
+                  found.slope);
+      EXPECT_LE(found.slope, 200) << arm.name << " " << size;
+    }
+  }
 }
 
 TEST(SingularRegion, FollowsTheSetAndEndsAtRegularPoses) {

@@ -608,6 +608,28 @@ TEST(Init, RefusesAProgramThatWasCompiledOtherwise) {
     settings.steepest = real(steepest);
     EXPECT_FALSE(is_refused()) << steepest;
   }
+  for (const double bad : {std::nan(""), -1.0, HUGE_VAL}) {
+    for (flexcomp_real flexcomp_settings::*member :
+         {&flexcomp_settings::largest_correction_rad, &flexcomp_settings::direction_band_rad,
+          &flexcomp_settings::plausible_position_m, &flexcomp_settings::plausible_orientation_rad}) {
+      const flexcomp_real good = settings.*member;
+      settings.*member = real(bad);
+      EXPECT_TRUE(is_refused()) << bad;
+      settings.*member = good;
+    }
+  }
+  settings.plausible_orientation_rad = real(2);
+  EXPECT_TRUE(is_refused());
+  flexcomp_settings_default(&settings);
+  std::memset(&settings.on_refusal, 77, sizeof settings.on_refusal);  // as a C program may
+  EXPECT_TRUE(is_refused());
+  for (const int what : {0, 1}) {
+    flexcomp_robot odd = robot;
+    if (what == 0) odd.payload_kg = -5;
+    if (what == 1) odd.max_rad[3] = 3e5;
+    EXPECT_EQ(flexcomp_init_explained(&memory, sizeof memory, &odd, nullptr, nullptr, &error), nullptr);
+    EXPECT_EQ(error, FLEXCOMP_INIT_ROBOT);
+  }
   settings.struct_size -= 4;
   EXPECT_TRUE(is_refused());
   EXPECT_EQ(flexcomp_init(&memory, sizeof memory, &robot, &settings, nullptr), nullptr);

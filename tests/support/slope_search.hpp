@@ -43,6 +43,17 @@ inline Subject subject(const arms::Arm& arm, const flexcomp::CompensationSetting
           flexcomp::default_context<double>(arm.robot), settings, arms::NominalJacobian(arm.robot)};
 }
 
+/// An arm whose axis 4 wobbles, by `size` rad and `order` times a turn: the link moves, and the wrist follows it.
+inline Subject with_wobble(const arms::Arm& arm, double size, double order) {
+  arms::TermSet<double> set = arms::table1(arm);
+  set.add(arms::on_link(4, flexcomp::slot::alpha), flexcomp::Basis::sine, size, 3, order);
+  return {arm.robot,
+          arms::prepared(arm.robot, set),
+          flexcomp::default_context<double>(arm.robot),
+          {},
+          arms::NominalJacobian(arm.robot)};
+}
+
 inline double norm(const Joints& v) {
   double sum = 0;
   for (const double x : v) sum += x * x;

@@ -50,6 +50,8 @@ void begin_model(const Robot& robot, FirmwareModel& model);
 Refusal add_record(const std::uint8_t* image, std::size_t size, ImageCursor& cursor, FirmwareModel& model);
 /// Model::finish_chain() of the core.
 void finish_chain(FirmwareModel& model);
+/// Model::finish_bounds() of the core.
+void finish_bounds(FirmwareModel& model);
 /// Model::finish_size() of the core.
 void finish_size(FirmwareModel& model);
 

@@ -170,7 +170,17 @@ class Store {
   void release();
   bool free_model(std::uint32_t& index) const;
   /// What comes next in the check of an image; each is some slices.
-  enum class Check : std::uint8_t { header, checksum, records, chain, size, probes, bounds, verdict };
+  enum class Check : std::uint8_t {
+    header,
+    checksum,
+    records,
+    chain,
+    derivatives,
+    size,
+    probes,
+    bounds,
+    verdict
+  };
   /// What a check is for.
   enum class Purpose : std::uint8_t { verify, commit, rollback };
   void begin_check(std::uint32_t size, std::uint32_t index);

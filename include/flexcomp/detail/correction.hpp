@@ -91,9 +91,9 @@ class Correction {
   }
 
   /// Rate of the readings (rad/s) for the command's rate (C22), the derivative of what run() gave as q where nothing was
-  /// given up; context and set stand still. Work: at most 9 chain passes, 20 linear solutions, 8 evaluations of the
+  /// given up; context and set stand still. False where the rounds do not end. Work: at most 9 chain passes, 20 linear solutions, 8 evaluations of the
   /// effects.
-  FLEXCOMP_RARE void rate(const std::array<S, N>& q, std::array<S, N>& out) {
+  FLEXCOMP_RARE bool rate(const std::array<S, N>& q, std::array<S, N>& out) {
     // J of the chain as it stands, linear in the rates.
     std::array<S, N> turn;
     for (std::size_t i = 0; i < N; ++i) turn[i] = psi_[i] - q[i] + ahead_[i];
@@ -134,7 +134,8 @@ class Correction {
         changed += change * change;
       }
       // The remainder is smaller by the slope of the effects.
-      if (!(changed > S(1e-12F) * square) || round == rate_rounds) return;
+      if (!(changed > S(1e-12F) * square)) return true;
+      if (round == rate_rounds) return false;
       rest = target;
       effect_rates(q, out, chain, rest);
     }
@@ -281,7 +282,9 @@ class Correction {
 
   /// Factors the Jacobian of solver_.joints() at the tool point.
   void factor(const Vec3<S>& tool) {
-    if (!solver_.set(tool, region_)) solver_.set_damped(region_);
+    if (solver_.set(tool, region_)) return;
+    solver_.set_damped(region_);
+    near_ = true;
   }
 
   /// Turns the chain's joints, psi, until the flange is at the target (C5, C6): corrections `first` to `last`. q
@@ -295,8 +298,9 @@ class Correction {
       chain_rest(flange, point, shift, turn);
       if (linear_ && first == 1) linearise(flange);
       // Near a singularity the first correction can turn the wrist by 20 mrad, which changes the Jacobian by some percent:
-      // from there on the Jacobian of this chain is used, which is close to that of the solution.
-      if (!fresh_ && (solver_.is_damped() || solver_.jacobian_is_stale(turned_))) {
+      // from there on the Jacobian of this chain is used, which is close to that of the solution. Already where nothing is
+      // damped yet: a change of Jacobian at the edge of the damping would be a step.
+      if (!fresh_ && (near_ || solver_.is_damped() || solver_.jacobian_is_stale(turned_))) {
         solver_.joints() = joints_;
         factor(point);
         fresh_ = true;
@@ -437,7 +441,9 @@ class Correction {
       }
     }
     if (!loaded_ && !moves_ && model_.plan().size(group::other) == 0) return;
-    S before_square = S(1);
+    // Before the first step the bound of their slope stands for the ratio of the steps.
+    S ratio = model_.plan().slope_square();
+    S before_square = S(0);
     const int most = moves_ ? most_moving_steps : most_deflection_steps;
     for (int n = 0; n < most; ++n) {
       std::array<S, N> step;
@@ -450,7 +456,9 @@ class Correction {
         size += y * y;
         step[i] = (step[i] - y) * share_[i];
       }
-      if (moves_) follow_links(q, step);
+      // Near a singularity the links that follow the wrist that follows the links would not come to rest: there the chain
+      // follows them once, and farther off, by and by, until it does.
+      if (moves_) follow_links(q, n == 0 ? S(1) : solver_.undamped_share(), step);
       S square = S(0);
       for (std::size_t i = 0; i < N; ++i) {
         const S d = step[i];
@@ -461,28 +469,33 @@ class Correction {
       // The remainders are a geometric sequence, whose ratio is the slope of the effects: at least their own size, as for
       // sines of some rad, and what the last two steps show.
       const S tolerance = Tolerance<S>::joint_rad * Tolerance<S>::joint_rad;
-      const S ratio = square / before_square;
+      if (n != 0) ratio = square / before_square;
       const S left = square * (ratio > size ? ratio : size);
       if (left <= tolerance) {
-        joint_left_ += left;
+        joint_left_ += left + unfollowed_;
         return;
       }
       before_square = square;
     }
-    joint_left_ += before_square;
+    joint_left_ += before_square + unfollowed_;
     converged_ = false;
   }
 
-  /// Solves the chain again, whose links have moved: psi, and with it the step of the readings q, take the change.
-  /// `angle_` belongs to q.
-  FLEXCOMP_ONCE void follow_links(const std::array<S, N>& q, std::array<S, N>& step) {
+  /// Solves the chain again, whose links have moved: psi, and with it the step of the readings q, take `share` of the
+  /// change. `angle_` belongs to q.
+  FLEXCOMP_ONCE void follow_links(const std::array<S, N>& q, const S& share, std::array<S, N>& step) {
     const std::array<S, N> from = psi_;
     std::array<S, N> to_psi;
     for (std::size_t i = 0; i < N; ++i) to_psi[i] = psi_[i] - q[i];
     rotate_all(angle_, to_psi, square_of(to_psi));
     solve_chain(psi_, most_corrections - 1, most_corrections - 1);
+    unfollowed_ = S(0);
     for (std::size_t i = 0; i < N; ++i) {
-      step[i] += (psi_[i] - from[i]) * share_[i];
+      const S whole = psi_[i] - from[i];
+      const S change = whole * share;
+      unfollowed_ += (whole - change) * (whole - change);
+      psi_[i] = from[i] + change;
+      step[i] += change * share_[i];
       ahead_[i] = q[i] - from[i];
     }
   }
@@ -512,7 +525,9 @@ class Correction {
   bool linear_ = false;  ///< the first-order change of the deflection is known (C13)
   bool moves_ = false;   ///< some effect moves links, base or tool
   bool fresh_ = false;   ///< the Jacobian is that of the chain
+  bool near_ = false;    ///< a Jacobian was near a singularity
   bool converged_ = true;
+  S unfollowed_ = S(0);  ///< square of what the chain has not followed its links, rad^2
   S joint_left_ = S(0);  ///< square of what the last iterates leave of the joints, rad^2
   S position_left_ = S(0), orientation_left_ = S(0);
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What the control cycle needs of a prepared model beside its chain: effects sorted by the kernel that evaluates them,
-/// first-order motions of the constant terms, reach (docs/compensation.md, section 2).
+/// bounds of their derivatives, first-order motions of the constant terms, reach (docs/compensation.md, section 2).
 #ifndef FLEXCOMP_DETAIL_CYCLE_PLAN_HPP
 #define FLEXCOMP_DETAIL_CYCLE_PLAN_HPP
 
@@ -76,6 +76,48 @@ class CyclePlan {
     }
   }
 
+  /// Bounds of the derivatives of the effects, by which the iterations of the deflection end: work linear in the terms and
+  /// in the values of all tables.
+  template <class Model>
+  FLEXCOMP_RARE void bound_derivatives(const Model& model) {
+    std::array<Derivatives, Cap::tables> tables{};
+    for (std::size_t k = 0; k < model.table_count(); ++k) {
+      const Table& table = model.table(k);
+      tables[k] =
+          table.rows != 0 ? of_grid(model.values(table), table) : of_curve(model.values(table), table);
+    }
+    std::array<S, N> third{};
+    S slope = S(0);
+    for (std::uint8_t g = group::loaded; g < group::count; ++g) {
+      for (std::size_t k = 0; k < size(g); ++k) {
+        const Term<S>& t = model.effect(index(g, k));
+        S scale = magnitude(t.coefficient);
+        // Temperature and payload are taken as 100 K and kg from where the term is 0.
+        if (t.factor != Factor::one) scale *= S(100);
+        Derivatives of = {S(0), S(0)};
+        if (t.basis == Basis::curve || t.basis == Basis::grid) {
+          of = tables[t.table];
+        } else if (t.basis == Basis::sine || t.basis == Basis::cosine) {
+          const S order = magnitude(t.argument);
+          of = {order, order * order * order};
+        } else if (t.basis == Basis::joint_position) {
+          of.slope = S(1);
+        }
+        if (g == group::own) {
+          third[t.place.body - 1U] += scale * of.third;
+        } else {
+          slope += scale * of.slope;
+        }
+      }
+    }
+    slope_square_ = slope * slope;
+    for (std::size_t i = 0; i < N; ++i) third_square_[i] = third[i] * third[i] * S(1e4 / 36);
+  }
+
+  /// Square of a bound of the slope of all effects but the own ones and those of loads, rad (m) per rad.
+  S slope_square() const { return slope_square_; }
+  /// Square of a hundred times a bound of a sixth of the third derivative of joint i's own deflection, rad^-2.
+  S third_square(std::size_t i) const { return third_square_[i]; }
   /// Number of effects of a group.
   std::size_t size(std::uint8_t g) const { return end_[g] - (g == 0 ? std::size_t{0} : end_[g - 1U]); }
   /// Index in the model of effect k of a group; equal levers are adjacent.
@@ -97,6 +139,51 @@ class CyclePlan {
   const SmallMotion<S>& base_twist() const { return base_twist_; }
 
  private:
+  /// Bounds of first and third derivative.
+  struct Derivatives {
+    S slope, third;
+  };
+
+  static S magnitude(const S& x) { return x < S(0) ? -x : x; }
+
+  /// Of a periodic cubic spline (M6): slopes lie between differences of coefficients that follow each other.
+  static Derivatives of_curve(const S* c, const Table& table) {
+    const std::size_t m = table.size;
+    S first = S(0), third = S(0);
+    for (std::size_t k = 0; k < m; ++k) {
+      const S c0 = c[k], c1 = c[k + 1 < m ? k + 1 : k + 1 - m], c2 = c[k + 2 < m ? k + 2 : k + 2 - m],
+              c3 = c[k + 3 < m ? k + 3 : k + 3 - m];
+      const S d1 = magnitude(c1 - c0), d3 = magnitude(c3 - c0 + S(3) * (c1 - c2));
+      if (d1 > first) first = d1;
+      if (d3 > third) third = d3;
+    }
+    const S per_rad = S(static_cast<float>(table.size)) * S(0.15915494309189533577);
+    return {first * per_rad, third * per_rad * per_rad * per_rad};
+  }
+
+  /// Of a grid (M7): all of its range between the two nodes that are closest, along both sides.
+  static Derivatives of_grid(const S* nodes, const Table& table) {
+    const S* v = nodes + table.rows + table.columns;
+    S low = *v, high = *v;
+    for (std::size_t k = 1; k < std::size_t{table.rows} * table.columns; ++k) {
+      const S value = v[k];
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    const S range = high - low;
+    return {over_least_distance(range, nodes, table.rows) +
+                over_least_distance(range, nodes + table.rows, table.columns),
+            S(0)};
+  }
+  static S over_least_distance(const S& change, const S* nodes, std::size_t count) {
+    S greatest = S(0);
+    for (std::size_t k = 1; k < count; ++k) {
+      const S steep = change / (nodes[k] - nodes[k - 1]);
+      if (steep > greatest) greatest = steep;
+    }
+    return greatest;
+  }
+
   using Count = std::conditional_t<Cap::terms <= 255, std::uint8_t, std::uint16_t>;
 
   template <class Model>
@@ -166,6 +253,8 @@ class CyclePlan {
   }
 
   std::array<S, N> compliance_{};
+  S slope_square_ = S(0);
+  std::array<S, N> third_square_{};
   S inverse_gravity_ = S(0);
   S reach_ = S(0);
   std::array<SmallMotion<S>, N> link_twist_{};

@@ -95,10 +95,10 @@ inline Symmetric<S> sum(const Symmetric<S>& a, const S& k, const Symmetric<S>& w
 }
 
 /// Inverse of a symmetric positive block A, damped along W (C9) where the least eigenvalue of A against W is below
-/// `threshold`: true there.
+/// `threshold`. Returns the lack of (C9), 0 where it is not, up to 1.
 template <class S>
-FLEXCOMP_RARE bool damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, S threshold,
-                                  Symmetric<S>& inverse) {
+FLEXCOMP_RARE S damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, S threshold,
+                               Symmetric<S>& inverse) {
   // The eigenvalues z of (A + t W)^-1 t W are t / (mu + t), with z^3 - e1 z^2 + e2 z - e3 = 0. All are real and at most 1:
   // from there Newton's method falls to the greatest one. The number of steps is fixed: a smooth function of A and W.
   const S t = threshold;
@@ -117,9 +117,12 @@ FLEXCOMP_RARE bool damped_inverse(const Symmetric<S>& a, const Symmetric<S>& w, 
   }
   // mu / t = 1 / z - 1
   const S lack = S(2) - S(1) / z;
-  const bool damped = lack > S(0);
-  invert_factored(damped ? sum(a, t * lack * lack, w) : a, inverse);
-  return damped;
+  if (!(lack > S(0))) {
+    invert_factored(a, inverse);
+    return S(0);
+  }
+  invert_factored(sum(a, t * lack * lack, w), inverse);
+  return lack;
 }
 
 /// Limit of the orientation part in a correction (0, 1, 2), relative to the largest correction (C10). A
@@ -241,7 +244,7 @@ class DampedJacobianSolver {
       q[2] = q[2] + c.origin * c.axis.z;
     }
     Symmetric<S> w = {S(1), S(1), S(1), S(0), S(0), S(0)};
-    if (damped_inverse(p, w, region.position, position_)) damped_ = true;
+    take_lack(damped_inverse(p, w, region.position, position_));
     Vec3<S> g[3];
     for (int r = 0; r < 3; ++r) {
       g[r] = position_ * q[r];
@@ -252,7 +255,7 @@ class DampedJacobianSolver {
     m.xy -= dot(g[0], q[1]), m.xz -= dot(g[0], q[2]), m.yz -= dot(g[1], q[2]);
     w.xx += l * dot(g[0], g[0]), w.yy += l * dot(g[1], g[1]), w.zz += l * dot(g[2], g[2]);
     w.xy += l * dot(g[0], g[1]), w.xz += l * dot(g[0], g[2]), w.yz += l * dot(g[1], g[2]);
-    if (damped_inverse(m, w, region.orientation, orientation_)) damped_ = true;
+    take_lack(damped_inverse(m, w, region.orientation, orientation_));
   }
 
   /// Motion of tool point (m) and flange (rad) by joint turns, to first order: J dq.
@@ -266,6 +269,8 @@ class DampedJacobianSolver {
 
   /// True where any solution so far was damped (C9) or scaled (C10).
   bool is_damped() const { return damped_; }
+  /// 1 where no factorisation so far was damped, 0 at a singularity, smooth between.
+  S undamped_share() const { return (S(1) - lack_) * (S(1) - lack_); }
   /// kappa of (C9), the smaller one of both blocks, at most 1: m^2, or 1 for orientation.
   S regular() const { return regular_; }
   /// True where turns of the joints since set() with this sum of squares (rad^2) change the Jacobian by a
@@ -326,6 +331,12 @@ class DampedJacobianSolver {
     return trace > S(0) && det > S(0) ? det / trace : S(0);
   }
 
+  void take_lack(const S& lack) {
+    if (!(lack > S(0))) return;
+    damped_ = true;
+    if (lack > lack_) lack_ = lack < S(1) ? lack : S(1);
+  }
+
   FLEXCOMP_RARE S solve_limited(const Vec3<S>& u, const Vec3<S>& v, const Vec3<S>& w, S largest,
                                 S largest_turn, std::array<S, N>& dq) {
     std::array<S, N> turn;
@@ -344,6 +355,7 @@ class DampedJacobianSolver {
   Symmetric<S> orientation_;
   S gain_[9];  ///< rows of Q P^-1
   S regular_ = S(0);
+  S lack_ = S(0);
   bool damped_ = false;
 };
 

@@ -54,8 +54,8 @@ FLEXCOMP_ONCE void own_deflections(const Model<S, N, Cap>& model, const Context<
 constexpr int most_own_steps = 4;
 
 /// Solves x + own(x) = q for the readings x by Newton's method with the curvature (C14), in place; `ahead` takes the same
-/// change. `share` becomes w = 1 / (1 + own'). False where it does not end: the curvature's part of the step, of which the
-/// next term is a fraction, stays above `tolerance` (rad).
+/// change. `share` becomes w = 1 / (1 + own'). False where it does not end: the curvature's part of the step, of which what
+/// it leaves is a fraction, or a hundred times the bound of what the third derivative leaves, stays above `tolerance` (rad).
 template <class S, std::size_t N, class Cap>
 FLEXCOMP_ONCE bool subtract_own_deflections(const Model<S, N, Cap>& model, const Context<S, N>& context,
                                             const S& tolerance, std::array<S, N>& q, std::array<S, N>& ahead,
@@ -73,6 +73,10 @@ FLEXCOMP_ONCE bool subtract_own_deflections(const Model<S, N, Cap>& model, const
       q[i] -= newton + bend;
       ahead[i] -= newton + bend;
       if (bend * bend > largest) largest = bend * bend;
+      // Where the curvature vanishes the third derivative decides.
+      const S square = newton * newton;
+      const S left = model.plan().third_square(i) * square * square * square;
+      if (left > largest) largest = left;
     }
     if (largest <= tolerance * tolerance) return true;
   }
