@@ -57,8 +57,8 @@ constexpr std::array<BlockPlace, map::block_count> served() {
   std::array<BlockPlace, map::block_count> out{};
   for (std::size_t k = 0; k < map::block_count; ++k) {
     const map::BlockDescription& d = map::block_descriptions[k];
-    const bool harmless =
-        d.block == Block::reading_offset || d.block == Block::probe_request || d.block == Block::probe_trigger;
+    const bool harmless = d.block == Block::reading_offset || d.block == Block::probe_request ||
+                          d.block == Block::probe_trigger;
     out[k] = BlockPlace{d.block, d.address, d.registers, d.readable, d.writable, harmless};
   }
   return out;
@@ -654,7 +654,8 @@ void ModbusRtu::gap() {
     const std::size_t n = size_ - from;
     if (crc != 0xFFFF || n < shortest || !is_ours(from)) continue;
     const std::size_t length = expected(from);
-    if (length == n || (length == any_even && n >= 8 && n % 2 == 0) || (length == 0 && is_mark(from))) found = from;
+    if (length == n || (length == any_even && n >= 8 && n % 2 == 0) || (length == 0 && is_mark(from)))
+      found = from;
   }
   if (found != size_) {
     take_frame(found);
