@@ -277,17 +277,17 @@ void TcpPort::serve(Connection& c) {
       end(c, false);
     }
   }
-  if (!flush(c)) {
-    close(c);
-  } else if (c.ending) {
+  bool is_over = !flush(c);
+  if (c.ending) {
     if (c.out.empty() && !c.is_shut) {
       ::shutdown(c.socket.get(), SHUT_WR);
       c.is_shut = true;
     }
-    if ((c.is_shut && c.is_finished) || now_ms() - c.ended_ms >= ending_ms) close(c);
-  } else if (idle_ms_ != 0 && now_ms() - c.used_ms >= idle_ms_) {
-    close(c);
+    is_over = is_over || (c.is_shut && c.is_finished) || now_ms() - c.ended_ms >= ending_ms;
+  } else {
+    is_over = is_over || (idle_ms_ != 0 && now_ms() - c.used_ms >= idle_ms_);
   }
+  if (is_over) close(c);
 }
 
 void TcpPort::serve() {

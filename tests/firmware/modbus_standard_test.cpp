@@ -16,7 +16,7 @@ class ModbusStandard : public testing::Test {
 
 // --- V1.1b3 -------------------------------------------------------------------------------------------
 
-// Figures 22 and 26: quantity and byte count (03), then addresses (02), then the application (04).
+// 6.12 and 6.17: quantity and byte count (03), then addresses (02), then the application (04).
 TEST_F(ModbusStandard, ByteCountIsCheckedWithTheQuantity) {
   EXPECT_EQ(client.ask(join({{0x10}, be({0x9F, 1}), {3}, Bytes(2)})), exception(0x10, 3));
   EXPECT_EQ(client.ask(join({{0x10}, be({0x9F, 1}), {2}, Bytes(3)})), exception(0x10, 3));
