@@ -577,9 +577,10 @@ flexcomp_rtu* flexcomp_rtu_init(void* memory, size_t size, flexcomp_arm* fc, uns
                                 flexcomp_send send, void* user);
 /** Takes bytes from the line, received until now_us (any clock that wraps at 32 bits), in any portions; the
  * sooner after the last byte of a request the call comes, the sooner the answer is sent. BACKGROUND; some
- * fifty instructions per byte, and per request what flexcomp_can_receive says. */
+ * fifty instructions per byte, after noise some thousands per call, and per request what flexcomp_can_receive says. */
 void flexcomp_rtu_receive(flexcomp_rtu* rtu, const uint8_t* bytes, size_t size, uint32_t now_us);
-/** Ends frames at the gap. Every millisecond or so. BACKGROUND; small, or one request. */
+/** Ends frames at the gap. Every millisecond or so. BACKGROUND; small, or one request; after noise some fifty
+ * instructions for each of at most 256 bytes. */
 void flexcomp_rtu_poll(flexcomp_rtu* rtu, uint32_t now_us);
 /** Tells that among the bytes last received the receiver lost characters (overrun nonzero) or saw a wrong parity or stop
  * bit (0): the frame that they are of is not used, and counted for Diagnostics. May be left out; the checksum finds what

@@ -11,6 +11,7 @@
 #include <sys/socket.h>
 #include <termios.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -188,16 +189,42 @@ void TcpPort::wait_on(std::vector<pollfd>& descriptors) const {
   }
 }
 
-/// A free connection; else that of the client which has been silent longest among those that were never answered, else
-/// among those that were not answered lately; else none. So neither a storm of connections nor one that asks once and
-/// stays ends a client that is being served.
-TcpPort::Connection* TcpPort::place_for_new() {
+TcpPort::Address TcpPort::address_of(int socket) {
+  Address out{};
+  sockaddr_storage peer{};
+  socklen_t size = sizeof peer;
+  if (::getpeername(socket, reinterpret_cast<sockaddr*>(&peer), &size) != 0) return out;
+  if (peer.ss_family == AF_INET6) {
+    std::memcpy(out.data(), &reinterpret_cast<sockaddr_in6*>(&peer)->sin6_addr, 16);
+  } else {
+    std::memcpy(out.data(), &reinterpret_cast<sockaddr_in*>(&peer)->sin_addr, 4);
+  }
+  return out;
+}
+
+std::size_t TcpPort::connections_of(const Address& client) const {
+  return static_cast<std::size_t>(
+      std::count_if(connections_.begin(), connections_.end(),
+                    [&client](const auto& c) { return c->socket && c->client == client; }));
+}
+
+/// A free connection. Else one of the address that has most, where the new client's has fewer by more than one; else one
+/// that was neither answered nor, by another address, opened lately. Of these the one silent longest, first among those
+/// that were never answered; or none. So neither a storm of connections nor one that asks once and stays ends a client
+/// that is being served, and nobody keeps out other addresses.
+TcpPort::Connection* TcpPort::place_for_new(const Address& client) {
   const std::uint32_t now = now_ms();
-  Connection* place = nullptr;
+  std::size_t most = 0;
   for (const auto& c : connections_) {
     if (!c->socket) return c.get();
+    most = std::max(most, connections_of(c->client));
+  }
+  const bool is_owed_one = connections_of(client) + 1 < most;
+  Connection* place = nullptr;
+  for (const auto& c : connections_) {
     const std::uint32_t idle = now - c->used_ms;
-    if (c->answered && idle < in_use_ms) continue;
+    const bool is_in_use = idle < in_use_ms && (c->answered || c->client != client);
+    if (is_owed_one ? connections_of(c->client) != most : is_in_use) continue;
     if (place == nullptr || (place->answered && !c->answered) ||
         (place->answered == c->answered && idle > now - place->used_ms)) {
       place = c.get();
@@ -211,13 +238,15 @@ void TcpPort::accept() {
   for (std::size_t k = 0; k < connections; ++k) {
     host::Descriptor s(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!s) return;
-    Connection* place = place_for_new();
+    const Address client = address_of(s.get());
+    Connection* place = place_for_new(client);
     if (place == nullptr) continue;  // closed at once: all are in use
     const int on = 1;
     ::setsockopt(s.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     keep_alive(s.get());
     close(*place);
     place->socket = std::move(s);
+    place->client = client;
     place->used_ms = now_ms();
     place->stream =
         std::make_unique<firmware::ModbusTcp>(place->server, address_.unit, firmware::Transmit{place, send});

@@ -65,9 +65,11 @@ class TcpPort final : public Port {
   static constexpr std::size_t connections = 16;
 
  private:
+  using Address = std::array<std::uint8_t, 16>;  ///< of IP, without the port
   struct Connection {
     Connection(firmware::Device& device, firmware::Origin origin) : server(device, origin) {}
     host::Descriptor socket;
+    Address client{};
     firmware::ModbusServer server;
     std::unique_ptr<firmware::ModbusTcp> stream;
     std::vector<std::uint8_t> out;  ///< bytes not yet sent
@@ -80,7 +82,9 @@ class TcpPort final : public Port {
   };
   static void send(void* connection, const std::uint8_t* bytes, std::size_t size);
   static bool flush(Connection& c);
-  Connection* place_for_new();
+  static Address address_of(int socket);
+  std::size_t connections_of(const Address& client) const;
+  Connection* place_for_new(const Address& client);
   void accept();
   void close(Connection& c);
   void end(Connection& c, bool is_finished);

@@ -94,7 +94,7 @@ class ModbusLine : public testing::Test {
   unsigned diagnose(unsigned sub, unsigned data = 0) {
     const Bytes r = ask(join({{8}, be({sub, data})}));
     if (r.size() != 8 || r[1] != 8) return 0xFFFFFF;
-    return (r[4] << 8U) | r[5];
+    return (static_cast<unsigned>(r[4]) << 8U) | r[5];
   }
   unsigned count(unsigned sub) { return diagnose(sub); }
 
@@ -141,6 +141,15 @@ TEST_F(ModbusLine, ATornRequestAndItsRepetition) {
     hear(Bytes(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(n)), 60'000);
     EXPECT_EQ(hear(request), answer) << n;
   }
+}
+
+// A transceiver that is switched off may be heard as a character.
+TEST_F(ModbusLine, ACharacterTooManyAfterARequest) {
+  for (const unsigned glitch : {0x00U, 0xFFU, 0x11U, 0x03U}) {
+    EXPECT_EQ(hear(join({request, {static_cast<std::uint8_t>(glitch)}})), answer);
+    EXPECT_EQ(hear(request), answer) << glitch;
+  }
+  EXPECT_EQ(count(12), 4U);
 }
 
 // A process that was held up reads noise and request in one portion: it is found at the gap.
