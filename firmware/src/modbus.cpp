@@ -440,7 +440,7 @@ constexpr std::uint32_t frame_silence_us = 1750;
 /// Shortest frame: unit, function, CRC.
 constexpr std::size_t shortest = 4;
 
-/// expected(): Return Query Data, of which only the checksum tells the end.
+/// expected(): Return Query Data, of which only checksum and silence tell the end.
 constexpr std::size_t any_even = 1;
 
 // Sub-functions of Diagnostics (V1.1b3, 6.8.1).
@@ -684,7 +684,9 @@ void ModbusRtu::receive(const std::uint8_t* bytes, std::size_t size, std::uint32
     }
     const std::size_t n = expected(0);
     if (n == any_even) {
-      if (size_ >= 8 && size_ % 2 == 0 && crc_ == 0) take_frame(0);
+      // One part in 65,536 of a longer one has a right checksum as well: byte by byte it ends at the gap.
+      const bool may_end = i + 1 == size && (size > 1 || size_ == 8);
+      if (may_end && size_ >= 8 && size_ % 2 == 0 && crc_ == 0) take_frame(0);
     } else if (n != 0 && size_ == n && crc_ == 0) {
       take_frame(0);
     } else if (n != 0 && (size_ >= n || n > frame_.size())) {

@@ -143,6 +143,27 @@ TEST_F(ModbusLine, ATornRequestAndItsRepetition) {
   }
 }
 
+// An adapter that passes bytes on in bursts, with pauses longer than the standard's silence.
+TEST_F(ModbusLine, FramesTornByPausesAreWhole) {
+  std::mt19937 random(8);
+  for (unsigned k = 0; k < 20000; ++k) {
+    Bytes data(2 * (1 + random() % 100));
+    // Much of it looks like the beginning of a frame.
+    for (auto& b : data) b = std::array<std::uint8_t, 6>{17, 0, 3, 8, 0x10, 0xFF}.at(random() % 6);
+    const Bytes head = be({map::probe_request, static_cast<unsigned>(data.size() / 2)});
+    const Bytes frame = rtu(17, join({{0x10}, head, {static_cast<std::uint8_t>(data.size())}, data}));
+    Bytes said;
+    for (std::size_t at = 0; at < frame.size();) {
+      const std::size_t n = std::min<std::size_t>(1 + random() % 40, frame.size() - at);
+      const auto from = frame.begin() + static_cast<std::ptrdiff_t>(at);
+      said = join({said, hear(Bytes(from, from + static_cast<std::ptrdiff_t>(n)),
+                              static_cast<std::uint32_t>(random() % 20'000))});
+      at += n;
+    }
+    ASSERT_EQ(said, rtu(17, join({{0x10}, head}))) << k;
+  }
+}
+
 // A transceiver that is switched off may be heard as a character.
 TEST_F(ModbusLine, ACharacterTooManyAfterARequest) {
   for (const unsigned glitch : {0x00U, 0xFFU, 0x11U, 0x03U}) {
@@ -189,6 +210,11 @@ TEST_F(ModbusLine, ReturnQueryDataOfAnyEvenLength) {
     Bytes pdu{8, 0, 0};
     for (std::size_t k = 0; k < n; ++k) pdu.push_back(static_cast<std::uint8_t>(31 * k + n));
     EXPECT_EQ(ask(pdu), rtu(17, pdu)) << n;
+    // Byte by byte any of its parts may have a right checksum: it ends at the gap.
+    Bytes said;
+    for (const std::uint8_t b : rtu(17, pdu)) said = join({said, hear({b}, 100)});
+    if (n > 2) said = join({said, gap()});
+    EXPECT_EQ(said, rtu(17, pdu)) << n;
   }
   EXPECT_EQ(hear({0x33, 0x44}, 60'000), Bytes{});
   const Bytes pdu{8, 0, 0, 1, 2, 3, 4};
