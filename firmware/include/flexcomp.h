@@ -573,23 +573,32 @@ void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms);
 typedef void (*flexcomp_send)(void* user, const uint8_t* bytes, size_t size);
 
 /** Builds a Modbus RTU line: unit 1 ... 247. gap_us is the silence that ends a frame: 1750 where bytes are
- * seen as they arrive, more where they arrive in bursts. The receiver must be off while sending. BACKGROUND;
- * small, no hook. */
+ * seen as they arrive (3.5 characters up to 19200 baud), more where they arrive in bursts. The receiver must be off
+ * while sending. An answer is given as soon as the request is whole: `send` keeps the silence of 3.5 characters before
+ * it (Modbus over Serial Line V1.02, 2.5.1.1) where the line is faster than the program. Another init in the same memory
+ * ends the line that was there: what it staged is discarded. BACKGROUND; small, no hook. */
 flexcomp_rtu* flexcomp_rtu_init(void* memory, size_t size, flexcomp_arm* fc, unsigned unit, uint32_t gap_us,
                                 flexcomp_send send, void* user);
 /** Takes bytes from the line, received until now_us (any clock that wraps at 32 bits), in any portions; the
  * sooner after the last byte of a request the call comes, the sooner the answer is sent. BACKGROUND; some
- * fifty instructions per byte, and per request what flexcomp_can_receive says. */
+ * fifty instructions per byte, after noise some thousands per call, and per request what flexcomp_can_receive says. */
 void flexcomp_rtu_receive(flexcomp_rtu* rtu, const uint8_t* bytes, size_t size, uint32_t now_us);
-/** Ends frames at the gap. Every millisecond or so. BACKGROUND; small, or one request. */
+/** Ends frames at the gap. Every millisecond or so. BACKGROUND; small, or one request; after noise some fifty
+ * instructions for each of at most 256 bytes. */
 void flexcomp_rtu_poll(flexcomp_rtu* rtu, uint32_t now_us);
+/** Tells that among the bytes last received the receiver lost characters (overrun nonzero) or saw a wrong parity or stop
+ * bit (0): the frame that they are of is not used, and counted for Diagnostics. May be left out; the checksum finds what
+ * is wrong. BACKGROUND; small. */
+void flexcomp_rtu_line_error(flexcomp_rtu* rtu, int overrun);
 
-/** Builds a Modbus TCP connection: one object per connection that may be open at a time; init again (or
- * reset) for the next connection. BACKGROUND; small, no hook. */
+/** Builds a Modbus TCP connection: one object per connection that may be open at a time. Another init in the same
+ * memory (or reset) is for the next connection, and ends the one that was there: what it staged is discarded.
+ * BACKGROUND; small, no hook. */
 flexcomp_tcp* flexcomp_tcp_init(void* memory, size_t size, flexcomp_arm* fc, unsigned unit,
                                 flexcomp_send send, void* user);
-/** Takes bytes of the stream in any portions. 0 where it is not Modbus: close the connection. BACKGROUND; as
- * for RTU. */
+/** Takes bytes of the stream in any portions. 0 where it is not Modbus: close the connection. Which connections are
+ * open, how long they may be idle, and which one gives way to a new one is the program's: docs/modbus.md.
+ * BACKGROUND; as for RTU. */
 int flexcomp_tcp_receive(flexcomp_tcp* tcp, const uint8_t* bytes, size_t size);
 /** Ends a connection: discards what it staged; the object is ready for the next one. BACKGROUND; small. */
 void flexcomp_tcp_reset(flexcomp_tcp* tcp);

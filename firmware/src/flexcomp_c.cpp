@@ -60,7 +60,7 @@ struct Arm {
     h.log(h.user, static_cast<unsigned>(event), detail);
   }
 
-  /// A number that no other bus object of this arm has.
+  /// A number that no other CAN node of this arm has.
   fw::Origin next_origin() { return ++origins; }
 
   /// Who stages by flexcomp_stage_begin().
@@ -85,9 +85,17 @@ struct Can {
   fw::CanopenNode node;
 };
 
+/// Client that a Modbus object is to the store: by its memory, so that another init there ends what the object before
+/// it staged. Above all numbers of Arm::next_origin().
+fw::Origin origin_of(const void* memory) {
+  return static_cast<fw::Origin>(reinterpret_cast<std::uintptr_t>(memory) / 8) | 0x80000000U;
+}
+
 struct Rtu {
   Rtu(Arm& arm, std::uint8_t unit, std::uint32_t gap_us, flexcomp_send send, void* user)
-      : server(arm.device, arm.next_origin()), line(server, unit, gap_us, {user, send}) {}
+      : server(arm.device, origin_of(this)), line(server, unit, gap_us, {user, send}) {
+    server.disconnect();
+  }
   fw::ModbusServer server;
   fw::ModbusRtu line;
 };
@@ -96,8 +104,10 @@ struct Tcp {
   Tcp(Arm& arm, std::uint8_t c_unit, flexcomp_send send, void* user)
       : unit(c_unit),
         transmit{user, send},
-        server(arm.device, arm.next_origin()),
-        stream(server, unit, transmit) {}
+        server(arm.device, origin_of(this)),
+        stream(server, unit, transmit) {
+    server.disconnect();
+  }
   std::uint8_t unit;
   fw::Transmit transmit;
   fw::ModbusServer server;
@@ -585,6 +595,8 @@ void flexcomp_rtu_receive(flexcomp_rtu* rtu, const uint8_t* bytes, size_t size, 
 }
 
 void flexcomp_rtu_poll(flexcomp_rtu* rtu, uint32_t now_us) { rtu_of(rtu).line.poll(now_us); }
+
+void flexcomp_rtu_line_error(flexcomp_rtu* rtu, int overrun) { rtu_of(rtu).line.line_error(overrun != 0); }
 
 flexcomp_tcp* flexcomp_tcp_init(void* memory, size_t size, flexcomp_arm* fc, unsigned unit,
                                 flexcomp_send send, void* user) {

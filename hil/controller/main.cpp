@@ -36,6 +36,8 @@ constexpr std::string_view usage =
     "  --store FILE                               non-volatile memory; made where it does not exist\n"
     "  --can IFACE[:NODE]                         serve CANopen on a SocketCAN interface\n"
     "  --modbus-tcp HOST[:PORT][:UNIT]            serve Modbus TCP; PORT 0 takes a free one\n"
+    "  --modbus-idle-s 60                         close TCP connections without a request for so long, s; 0: "
+    "never\n"
     "  --modbus-rtu DEVICE[:BAUD[:PARITY]][:UNIT] serve Modbus RTU on a serial device\n"
     "  --cycle-us 1000                            period of the control cycle, us\n"
     "  --trial-cycles 60000                       control cycles until an unconfirmed trial reverts\n"
@@ -59,6 +61,7 @@ struct Options {
   std::uint32_t cycle_us = 1000;
   std::uint32_t trial_cycles = 60000;
   std::uint16_t heartbeat_ms = 1000;
+  std::uint32_t modbus_idle_s = 60;
 };
 
 std::uint32_t number(const std::string& option, const std::string& text, std::uint32_t least,
@@ -111,6 +114,8 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
       o.tcp = tcp_address(value);
     } else if (option == "--modbus-rtu") {
       o.rtu = std::get<host::ModbusRtuAddress>(host::parse_bus_address("modbus-rtu:" + value).at);
+    } else if (option == "--modbus-idle-s") {
+      o.modbus_idle_s = number(option, value, 0, 1000000);
     } else if (option == "--cycle-us") {
       o.cycle_us = number(option, value, 50, 1000000);
     } else if (option == "--fade-cycles") {
@@ -186,7 +191,8 @@ int serve(const Options& options) {
   if (options.can)
     ports.push_back(std::make_unique<hil::CanPort>(*device, 1, *options.can, options.heartbeat_ms));
   if (options.rtu) ports.push_back(std::make_unique<hil::RtuPort>(*device, 2, *options.rtu));
-  if (options.tcp) ports.push_back(std::make_unique<hil::TcpPort>(*device, 3, *options.tcp));
+  if (options.tcp)
+    ports.push_back(std::make_unique<hil::TcpPort>(*device, 3, *options.tcp, options.modbus_idle_s * 1000));
 
   std::atomic<bool> stop{false};
   std::thread cycle(run_cycle, std::ref(*device), options.cycle_us, std::cref(stop));

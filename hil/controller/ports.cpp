@@ -11,11 +11,13 @@
 #include <sys/socket.h>
 #include <termios.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <map>
+#include <thread>
 
 #include "errors.hpp"
 
@@ -25,11 +27,32 @@ namespace {
 
 std::string reason() { return std::strerror(errno); }
 
-/// Silence that ends a frame, Modbus over Serial Line V1.02, 2.5.1.1. Longer than the standard's 1.75 ms
-/// because a process receives bytes in bursts; much shorter than a client's response time-out.
+/// Silence that brings a line back in step. Longer than that of Modbus over Serial Line V1.02, 2.5.1.1, because a process
+/// receives bytes in bursts; much shorter than a client's response time-out.
 constexpr std::uint32_t rtu_gap_us = 50'000;
 
+/// Silence between two frames, V1.02, 2.5.1.1: 3.5 characters of 11 bits, at least 1.75 ms.
+std::uint32_t silence_us(std::uint32_t baud) { return baud > 19200 ? 1750 : 38'500'000 / baud; }
+
 constexpr std::size_t most_unsent_bytes = 65536;
+
+/// Within this time a client that was answered does not give way to a new one.
+constexpr std::uint32_t in_use_ms = 2000;
+
+/// A connection that is ended waits so long for its client.
+constexpr std::uint32_t ending_ms = 1000;
+
+/// A client that is gone without a word (power, cable) is noticed within 25 s.
+void keep_alive(int socket) {
+  const auto set = [socket](int level, int option, int value) {
+    ::setsockopt(socket, level, option, &value, sizeof value);
+  };
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 10);
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 5);
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+  set(IPPROTO_TCP, TCP_USER_TIMEOUT, 25'000);
+}
 
 }  // namespace
 
@@ -118,8 +141,8 @@ std::string CanPort::text() const { return host::BusAddress{address_}.text(); }
 // --- Modbus TCP ---------------------------------------------------------------------------------------
 
 TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
-                 const host::ModbusTcpAddress& address)
-    : address_(address) {
+                 const host::ModbusTcpAddress& address, std::uint32_t idle_ms)
+    : address_(address), idle_ms_(idle_ms) {
   const auto fail = [&address](const std::string& what) {
     throw host::BusError("modbus-tcp:" + address.host + ":" + std::to_string(address.port), what);
   };
@@ -135,7 +158,7 @@ TcpPort::TcpPort(firmware::Device& device, firmware::Origin first_origin,
     host::Descriptor s(::socket(a->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int on = 1;
     if (s && ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
-        ::bind(s.get(), a->ai_addr, a->ai_addrlen) == 0 && ::listen(s.get(), 16) == 0) {
+        ::bind(s.get(), a->ai_addr, a->ai_addrlen) == 0 && ::listen(s.get(), SOMAXCONN) == 0) {
       listener_ = std::move(s);
     } else {
       why = reason();
@@ -160,33 +183,75 @@ void TcpPort::wait_on(std::vector<pollfd>& descriptors) const {
   descriptors.push_back({listener_.get(), POLLIN, 0});
   for (const auto& c : connections_) {
     if (!c->socket) continue;
-    const int read = c->out.size() < most_unsent_bytes ? POLLIN : 0;
+    const int read = c->out.size() < most_unsent_bytes && !c->is_finished ? POLLIN : 0;
     const int write = c->out.empty() ? 0 : POLLOUT;
     descriptors.push_back({c->socket.get(), static_cast<short>(read | write), 0});
   }
 }
 
+TcpPort::Address TcpPort::address_of(int socket) {
+  Address out{};
+  sockaddr_storage peer{};
+  socklen_t size = sizeof peer;
+  if (::getpeername(socket, reinterpret_cast<sockaddr*>(&peer), &size) != 0) return out;
+  if (peer.ss_family == AF_INET6) {
+    std::memcpy(out.data(), &reinterpret_cast<sockaddr_in6*>(&peer)->sin6_addr, 16);
+  } else {
+    std::memcpy(out.data(), &reinterpret_cast<sockaddr_in*>(&peer)->sin_addr, 4);
+  }
+  return out;
+}
+
+std::size_t TcpPort::connections_of(const Address& client) const {
+  return static_cast<std::size_t>(
+      std::count_if(connections_.begin(), connections_.end(),
+                    [&client](const auto& c) { return c->socket && c->client == client; }));
+}
+
+/// A free connection. Else one of the address that has most, where the new client's has fewer by more than one; else one
+/// that was neither answered nor, by another address, opened lately. Of these the one silent longest, first among those
+/// that were never answered; or none. So neither a storm of connections nor one that asks once and stays ends a client
+/// that is being served, and nobody keeps out other addresses.
+TcpPort::Connection* TcpPort::place_for_new(const Address& client) {
+  const std::uint32_t now = now_ms();
+  std::size_t most = 0;
+  for (const auto& c : connections_) {
+    if (!c->socket) return c.get();
+    most = std::max(most, connections_of(c->client));
+  }
+  const bool is_owed_one = connections_of(client) + 1 < most;
+  Connection* place = nullptr;
+  for (const auto& c : connections_) {
+    const std::uint32_t idle = now - c->used_ms;
+    const bool is_in_use = idle < in_use_ms && (c->answered || c->client != client);
+    if (is_owed_one ? connections_of(c->client) != most : is_in_use) continue;
+    if (place == nullptr || (place->answered && !c->answered) ||
+        (place->answered == c->answered && idle > now - place->used_ms)) {
+      place = c.get();
+    }
+  }
+  return place;
+}
+
 void TcpPort::accept() {
-  for (;;) {
+  // As many as there are places: then the others are served again.
+  for (std::size_t k = 0; k < connections; ++k) {
     host::Descriptor s(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!s) return;
+    const Address client = address_of(s.get());
+    Connection* place = place_for_new(client);
+    if (place == nullptr) continue;  // closed at once: all are in use
     const int on = 1;
     ::setsockopt(s.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    ::setsockopt(s.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
-    // If all are in use, the longest idle one is closed (Modbus Messaging on TCP/IP V1.0b, 4.2.1).
-    Connection* place = connections_.front().get();
-    for (const auto& c : connections_) {
-      if (!c->socket) {
-        place = c.get();
-        break;
-      }
-      if (c->used < place->used) place = c.get();
-    }
+    keep_alive(s.get());
     close(*place);
     place->socket = std::move(s);
-    place->used = ++clock_;
+    place->client = client;
+    place->used_ms = now_ms();
     place->stream =
         std::make_unique<firmware::ModbusTcp>(place->server, address_.unit, firmware::Transmit{place, send});
+    // Its request is there already, mostly; then it is a client that was answered.
+    serve(*place);
   }
 }
 
@@ -196,11 +261,21 @@ void TcpPort::close(Connection& c) {
   c.socket.close();
   c.out.clear();
   c.stream.reset();
+  c.answered = c.ending = c.is_finished = c.is_shut = false;
+}
+
+/// Closes a connection when all that was answered has been sent: a socket that is closed before throws it away.
+void TcpPort::end(Connection& c, bool is_finished) {
+  if (!c.ending) c.ended_ms = now_ms();
+  c.ending = true;
+  c.is_finished = is_finished;
 }
 
 void TcpPort::send(void* connection, const std::uint8_t* bytes, std::size_t size) {
   Connection& c = *static_cast<Connection*>(connection);
   c.out.insert(c.out.end(), bytes, bytes + size);
+  c.answered = true;
+  c.used_ms = now_ms();
 }
 
 bool TcpPort::flush(Connection& c) {
@@ -217,30 +292,39 @@ bool TcpPort::flush(Connection& c) {
 }
 
 void TcpPort::serve(Connection& c) {
-  std::array<std::uint8_t, 2048> in;
-  // Requests of a client that does not read its answers stay in the socket.
-  for (int k = 0; k < 16 && c.out.size() < most_unsent_bytes; ++k) {
+  // One longest frame in a turn: a client that sends many requests at once does not hold up the others. Requests of a
+  // client that does not read its answers stay in the socket.
+  std::array<std::uint8_t, wire::modbus::tcp_bytes> in;
+  if (c.out.size() < most_unsent_bytes && !c.is_finished) {
     const ssize_t n = ::recv(c.socket.get(), in.data(), in.size(), 0);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
-    if (n <= 0) {
+    if (n == 0) {
+      end(c, true);  // or only of what the client sends: a request before that is answered
+    } else if (n < 0 && errno != EINTR && errno != EAGAIN && errno != EWOULDBLOCK) {
       close(c);
       return;
-    }
-    c.used = ++clock_;
-    if (!c.stream->receive(in.data(), static_cast<std::size_t>(n))) {
-      flush(c);
-      close(c);
-      return;
+    } else if (n > 0 && !c.ending && !c.stream->receive(in.data(), static_cast<std::size_t>(n))) {
+      end(c, false);
     }
   }
-  if (!flush(c)) close(c);
+  bool is_over = !flush(c);
+  if (c.ending) {
+    if (c.out.empty() && !c.is_shut) {
+      ::shutdown(c.socket.get(), SHUT_WR);
+      c.is_shut = true;
+    }
+    is_over = is_over || (c.is_shut && c.is_finished) || now_ms() - c.ended_ms >= ending_ms;
+  } else {
+    is_over = is_over || (idle_ms_ != 0 && now_ms() - c.used_ms >= idle_ms_);
+  }
+  if (is_over) close(c);
 }
 
 void TcpPort::serve() {
-  for (const auto& c : connections_) {
-    if (c->socket) serve(*c);
+  for (std::size_t k = 0; k < connections; ++k) {
+    Connection& c = *connections_[(first_ + k) % connections];
+    if (c.socket) serve(c);
   }
+  first_ = (first_ + 1) % connections;
   accept();
 }
 
@@ -270,6 +354,7 @@ host::Descriptor RtuPort::open() const {
   t.c_cflag = static_cast<tcflag_t>(t.c_cflag & ~static_cast<tcflag_t>(CSTOPB | PARENB | PARODD | CRTSCTS));
   t.c_cflag |= CLOCAL | CREAD;
   if (address_.parity != host::Parity::none) t.c_cflag |= PARENB;
+  if (address_.parity == host::Parity::none) t.c_cflag |= CSTOPB;  // V1.02, 2.5.1: a character has 11 bits
   if (address_.parity == host::Parity::odd) t.c_cflag |= PARODD;
   t.c_cc[VMIN] = 0;
   t.c_cc[VTIME] = 0;
@@ -302,6 +387,7 @@ void RtuPort::serve() {
   for (int k = 0; k < 16; ++k) {
     const ssize_t n = ::read(device_.get(), in.data(), in.size());
     if (n > 0) {
+      heard_us_ = now_us();
       line_.receive(in.data(), static_cast<std::size_t>(n), now_us());
       continue;
     }
@@ -318,7 +404,11 @@ void RtuPort::serve() {
 }
 
 void RtuPort::send(void* self, const std::uint8_t* bytes, std::size_t size) {
-  const int fd = static_cast<RtuPort*>(self)->device_.get();
+  const RtuPort& port = *static_cast<RtuPort*>(self);
+  const int fd = port.device_.get();
+  const std::uint32_t silent = now_us() - port.heard_us_;
+  const std::uint32_t wanted = silence_us(port.address_.baud);
+  if (silent < wanted) std::this_thread::sleep_for(std::chrono::microseconds(wanted - silent));
   while (size != 0) {
     const ssize_t n = ::write(fd, bytes, size);
     if (n < 0 && errno == EINTR) continue;

@@ -49,11 +49,15 @@ class CanPort final : public Port {
   bool down_ = false;
 };
 
-/// Modbus TCP server: a listening socket and a fixed number of connections, each with its own server.
+/// Modbus TCP server: a listening socket and a fixed number of connections, each with its own server. Every connection gets
+/// at most one longest frame's worth of bytes served in turn. Connections that are idle too long are closed; where all are
+/// in use, docs/modbus.md says which one gives way to a new one (Modbus Messaging on TCP/IP V1.0b, 4.2.1).
 class TcpPort final : public Port {
  public:
+  /// `idle_ms`: time without an answered request after which a connection is closed; 0: none.
   /// \throws host::BusError  the address cannot be resolved or listened on
-  TcpPort(firmware::Device& device, firmware::Origin first_origin, const host::ModbusTcpAddress& address);
+  TcpPort(firmware::Device& device, firmware::Origin first_origin, const host::ModbusTcpAddress& address,
+          std::uint32_t idle_ms);
   void wait_on(std::vector<pollfd>& descriptors) const override;
   void serve() override;
   std::string text() const override;
@@ -61,24 +65,36 @@ class TcpPort final : public Port {
   static constexpr std::size_t connections = 16;
 
  private:
+  using Address = std::array<std::uint8_t, 16>;  ///< of IP, without the port
   struct Connection {
     Connection(firmware::Device& device, firmware::Origin origin) : server(device, origin) {}
     host::Descriptor socket;
+    Address client{};
     firmware::ModbusServer server;
     std::unique_ptr<firmware::ModbusTcp> stream;
     std::vector<std::uint8_t> out;  ///< bytes not yet sent
-    std::uint64_t used = 0;         ///< time of the last data, in requests of the port
+    std::uint32_t used_ms = 0;      ///< time of the last answer, or of the beginning
+    std::uint32_t ended_ms = 0;
+    bool answered = false;     ///< some request has been answered
+    bool ending = false;       ///< nothing more is taken in; closed when what is left has been sent
+    bool is_finished = false;  ///< the client sends no more
+    bool is_shut = false;      ///< nor do we
   };
   static void send(void* connection, const std::uint8_t* bytes, std::size_t size);
   static bool flush(Connection& c);
+  static Address address_of(int socket);
+  std::size_t connections_of(const Address& client) const;
+  Connection* place_for_new(const Address& client);
   void accept();
   void close(Connection& c);
+  void end(Connection& c, bool is_finished);
   void serve(Connection& c);
 
   host::ModbusTcpAddress address_;
+  std::uint32_t idle_ms_;
   host::Descriptor listener_;
   std::vector<std::unique_ptr<Connection>> connections_;
-  std::uint64_t clock_ = 0;
+  std::size_t first_ = 0;  ///< served first in this turn
 };
 
 /// Modbus RTU server on a serial device. A device that disappears (an unplugged adapter) is reopened.
@@ -98,6 +114,7 @@ class RtuPort final : public Port {
   firmware::ModbusServer server_;
   firmware::ModbusRtu line_;
   std::uint32_t closed_ms_ = 0;
+  std::uint32_t heard_us_ = 0;
 };
 
 }  // namespace flexcomp::hil

@@ -200,6 +200,7 @@ int main(void) {
     flexcomp_rtu_receive(rtu, request, sizeof request, 0);
     EXPECT(answer_size == 7 && answer[0] == 1 && answer[1] == 3 && answer[3] == 1);
     flexcomp_rtu_poll(rtu, 10000);
+    flexcomp_rtu_line_error(rtu, 1);
   }
 
   tcp = flexcomp_tcp_init(&tcp_memory, sizeof tcp_memory, fc, 1, send_bytes, NULL);

@@ -454,6 +454,37 @@ TEST(Staging, ByBytesIsRefusedAndAnsweredAsOnAWire) {
   EXPECT_EQ(arm.state().answer, 4U);
 }
 
+// A server builds the next connection where the last one was: what that had staged is dropped.
+TEST(Buses, AnotherInitInTheSameMemoryEndsTheOldConnection) {
+  CArm arm;
+  alignas(8) static flexcomp_tcp_memory memory[2];
+  alignas(8) static flexcomp_rtu_memory line_memory;
+  std::vector<std::uint8_t> reply;
+  const flexcomp_send send = [](void* to, const std::uint8_t* bytes, std::size_t size) {
+    static_cast<std::vector<std::uint8_t>*>(to)->assign(bytes, bytes + size);
+  };
+  const std::uint8_t begin[19] = {0, 0, 0, 0, 0, 13, 1, 0x10, 0x00, 0xA0, 0, 3, 6, 0, 0, 0, 200, 0, 1};
+  flexcomp_tcp* tcp = flexcomp_tcp_init(&memory[0], sizeof memory[0], arm.fc, 1, send, &reply);
+  flexcomp_tcp_receive(tcp, begin, sizeof begin);
+  EXPECT_EQ(reply.at(7), 0x10);
+  // Other memory is another connection.
+  flexcomp_tcp* other = flexcomp_tcp_init(&memory[1], sizeof memory[1], arm.fc, 1, send, &reply);
+  flexcomp_tcp_receive(other, begin, sizeof begin);
+  EXPECT_EQ(reply.at(7), 0x90);
+  tcp = flexcomp_tcp_init(&memory[0], sizeof memory[0], arm.fc, 1, send, &reply);
+  EXPECT_EQ(arm.state().store, 0U);
+  flexcomp_tcp_receive(other, begin, sizeof begin);
+  EXPECT_EQ(reply.at(7), 0x10);
+  flexcomp_tcp_reset(other);
+
+  const std::uint8_t begin_rtu[15] = {5, 0x10, 0x00, 0xA0, 0, 3, 6, 0, 0, 0, 200, 0, 1, 0xAE, 0xB8};
+  flexcomp_rtu* rtu = flexcomp_rtu_init(&line_memory, sizeof line_memory, arm.fc, 5, 1750, send, &reply);
+  flexcomp_rtu_receive(rtu, begin_rtu, sizeof begin_rtu, 0);
+  EXPECT_EQ(arm.state().store, 1U);
+  flexcomp_rtu_init(&line_memory, sizeof line_memory, arm.fc, 5, 1750, send, &reply);
+  EXPECT_EQ(arm.state().store, 0U);
+}
+
 TEST(Hooks, LogTellsWhatBecomesOfSets) {
   CArm arm;
   using Log = CArm::Log;

@@ -35,7 +35,10 @@
 /// - An application refuses with exception 04, or 06 where it is busy; `answer`, `refusal` and `detail` in
 ///   the status record say why. Two TCP connections have each their own offsets, argument and probe.
 /// - TCP: units 0, 255 and the configured one are this device, other units get no answer. RTU: unit 0 is
-///   broadcast, carried out and never answered.
+///   broadcast and never answered; carried out are writes (06, 16) to the reading offset and to the probe. Argument,
+///   command and staging are not written by a broadcast.
+/// - Function 17 tells server ID, whether a set is active, and the version; 43/14 the identification; 08, on a serial
+///   line, counters, and 11 its event counter (docs/modbus.md).
 #ifndef FLEXCOMP_WIRE_MODBUS_MAP_HPP
 #define FLEXCOMP_WIRE_MODBUS_MAP_HPP
 
@@ -78,6 +81,7 @@ constexpr std::size_t pdu_bytes = 253;             ///< largest PDU (4.1)
 constexpr std::size_t rtu_bytes = 256;             ///< largest RTU frame: unit, PDU, CRC-16 (4.1)
 constexpr std::size_t tcp_bytes = 260;             ///< largest TCP frame: MBAP header, PDU (4.1)
 constexpr std::uint16_t default_tcp_port = 502;    ///< registered with IANA
+constexpr std::uint8_t server_id = 0xF1;           ///< of function 17 (6.13): FLX1
 
 /// Exception codes, V1.1b3 clause 7.
 enum class Exception : std::uint8_t {

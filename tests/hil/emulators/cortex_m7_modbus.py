@@ -4,10 +4,12 @@
     cortex_m7_modbus.py WORK      inside hil/emulators/cortex-m7-modbus; WORK as `buses.py prepare` leaves it
 """
 import os
+import random
 import re
 import struct
 import subprocess
 import sys
+import time
 
 from emulated import Bench, Console, Master
 
@@ -106,6 +108,22 @@ def unknown_function():
     passed("an unknown function code: exception 01 after the gap")
 
 
+def noise():
+    """A request 5 ms after noise, which is less than the gap of the line, is answered; the line counts the errors."""
+    master = Master(UNIT)
+    rng = random.Random(4)
+    master.ask(struct.pack(">BHH", 8, 10, 0))
+    rounds = 20
+    for _ in range(rounds):
+        os.write(master.fd, bytes(rng.randrange(256) for _ in range(rng.randint(1, 60))))
+        time.sleep(0.005)
+        check(len(master.read(0x0000, 4)) == 8, "a request after noise")
+    errors = struct.unpack(">BHH", master.ask(struct.pack(">BHH", 8, 12, 0)))[2]
+    check(master.repeated == 0 and errors >= rounds, "each at the first attempt, the errors counted", master.repeated, errors)
+    master.close()
+    passed(f"{rounds} requests 5 ms after noise answered; Diagnostics tells {errors} errors")
+
+
 def main(work):
     bus = os.environ["FLEXCOMP_BUS"]
     bench, console = Bench(work, "modbus-rtu", bus), Console()
@@ -124,6 +142,7 @@ def main(work):
     judge_by_pymodbus(status, read(f"{work}/received"))
     judge_by_mbpoll(status)
     unknown_function()
+    noise()
     floats_for_people(console)
     passed("all of it")
 
