@@ -228,7 +228,8 @@ typedef struct flexcomp_storage {
   /** Makes a whole slot writable. */
   flexcomp_storage_result (*erase)(void* user, unsigned slot);
   /** Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot,
-   * each byte once between two erases; done means that they survive a power loss. */
+   * each byte once between two erases, save one whose writing the power has cut and that reads as erased; done means
+   * that they survive a power loss. */
   flexcomp_storage_result (*write)(void* user, unsigned slot, uint32_t offset, const uint8_t* from,
                                    uint32_t size);
 } flexcomp_storage;

@@ -28,7 +28,7 @@
 #define FLEXCOMP_STAGING_BYTES 12288
 #endif
 
-/** Non-volatile memory of one of the two slots, bytes: the image and its seal. */
-#define FLEXCOMP_SLOT_BYTES (FLEXCOMP_STAGING_BYTES + 32)
+/** Non-volatile memory of one of the two slots, bytes: the image, and 640 for its seals and marks. */
+#define FLEXCOMP_SLOT_BYTES (FLEXCOMP_STAGING_BYTES + 640)
 
 #endif

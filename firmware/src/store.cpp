@@ -16,10 +16,21 @@ using wire::StoreState;
 namespace {
 
 constexpr std::uint32_t seal_bytes = 32;
-constexpr std::uint32_t seal_offset = slot_bytes - seal_bytes;
+constexpr unsigned most_seals = 5;
+constexpr unsigned enough_seals = 3;
+constexpr std::uint32_t begin_offset = slot_bytes - (most_seals + 1U) * seal_bytes;
+constexpr std::uint32_t marks_offset = staging_bytes;
+constexpr unsigned most_marks = (begin_offset - marks_offset) / seal_bytes;
+constexpr std::uint32_t seal_offset(unsigned copy) { return slot_bytes - (copy + 1U) * seal_bytes; }
 constexpr std::uint32_t unit_bytes = 32;    ///< non-volatile memory is written in multiples of this
 constexpr std::uint32_t chunk_bytes = 256;  ///< most bytes per call
 constexpr std::uint8_t seal_magic[4] = {'F', 'L', 'X', 'S'};
+constexpr std::uint8_t mark_magic[4] = {'F', 'L', 'X', 'M'};
+constexpr std::uint8_t begin_magic[4] = {'F', 'L', 'X', 'B'};
+/// A sequence that is farther ahead of the active one is a mistake: it would leave no numbers for those that follow.
+constexpr std::uint32_t most_ahead = 0x10000U;
+constexpr unsigned most_readings = 3;     ///< of what may be a disturbed reading
+constexpr unsigned most_calls = 1000000;  ///< of a hook that is busy, at the start
 // Of one slice of a check. The instructions are those of a Cortex-M7.
 constexpr std::uint32_t checksum_bytes = 1024;  ///< 10 instructions each
 constexpr unsigned records_at_once = 16;        ///< terms; a table counts for as many
@@ -48,6 +59,9 @@ std::uint32_t unknown_basis(const std::uint8_t* bytes, std::uint32_t size) {
   }
   return 0;
 }
+
+/// Serial number arithmetic (RFC 1982): true where a follows b by less than half of all numbers.
+bool is_ahead(std::uint32_t a, std::uint32_t b) { return a != b && a - b < 0x80000000U; }
 
 /// A length in units of 1e-6, for the detail word; saturates.
 std::uint32_t micro(Scalar v) {
@@ -88,38 +102,166 @@ void Store::release() {
 
 // --- start --------------------------------------------------------------------------------------------
 
-bool Store::read_seal(unsigned slot, Set& set) {
-  std::uint8_t seal[seal_bytes];
-  if (storage_.read == nullptr) return false;
-  if (storage_.read(storage_.user, slot, seal_offset, seal, seal_bytes) != StorageResult::done) {
-    faults_ |= wire::fault::storage;
-    return false;
+bool Store::read_unit(unsigned slot, std::uint32_t offset, std::uint8_t* unit) {
+  return storage_.read != nullptr &&
+         storage_.read(storage_.user, slot, offset, unit, unit_bytes) == StorageResult::done;
+}
+
+namespace {
+
+bool is_erased(const std::uint8_t* unit) {
+  for (std::uint32_t k = 0; k < unit_bytes; ++k) {
+    if (unit[k] != 0xFF) return false;
   }
-  if (std::memcmp(seal, seal_magic, sizeof seal_magic) != 0) return false;
-  if (crc32(seal, seal_bytes - 4) != load_u32(seal + seal_bytes - 4)) return false;
-  set.slot = static_cast<std::uint16_t>(slot);
-  set.bytes = load_u32(seal + 4);
-  set.sequence = load_u32(seal + 8);
-  set.crc = load_u32(seal + 12);
-  return set.bytes >= shortest_image && set.bytes <= staging_bytes;
+  return true;
+}
+
+bool is_whole(const std::uint8_t* unit, const std::uint8_t* magic) {
+  return std::memcmp(unit, magic, 4) == 0 && crc32(unit, unit_bytes - 4) == load_u32(unit + unit_bytes - 4);
+}
+
+}  // namespace
+
+namespace {
+/// A unit that holds nothing but a generation.
+void make_unit(const std::uint8_t* magic, std::uint32_t generation, std::uint8_t* unit) {
+  std::memset(unit, 0, unit_bytes);
+  std::memcpy(unit, magic, 4);
+  store_u32(unit + 4, generation);
+  store_u32(unit + unit_bytes - 4, crc32(unit, unit_bytes - 4));
+}
+}  // namespace
+
+/// Writes a unit and reads it back. A unit that the power has cut may only look erased: then it fails.
+StorageResult Store::write_unit(unsigned slot, std::uint32_t offset, const std::uint8_t* unit) {
+  if (storage_.write == nullptr) return StorageResult::failed;
+  const StorageResult r = storage_.write(storage_.user, slot, offset, unit, unit_bytes);
+  if (r != StorageResult::done) return r;
+  std::uint8_t back[unit_bytes];
+  return read_unit(slot, offset, back) && std::memcmp(back, unit, unit_bytes) == 0 ? r
+                                                                                   : StorageResult::failed;
+}
+
+/// What the seals of a slot say; false where there is none.
+bool Store::read_seals(unsigned slot, Set& set) {
+  for (unsigned copy = 0; copy < most_seals; ++copy) {
+    std::uint8_t seal[seal_bytes];
+    if (!read_unit(slot, seal_offset(copy), seal) || !is_whole(seal, seal_magic)) continue;
+    const Set found = {Handover::none,
+                       static_cast<std::uint16_t>(slot),
+                       load_u32(seal + 8),
+                       load_u32(seal + 4),
+                       load_u32(seal + 12),
+                       load_u32(seal + 16),
+                       1};
+    if (found.bytes < shortest_image || found.bytes > staging_bytes) continue;
+    if (set.seals == 0) set = found;
+    // Others than the first can only be what is left of an erase.
+    if (found.crc == set.crc && found.generation == set.generation && set.seals < most_seals && copy != 0 &&
+        found.sequence == set.sequence && set.slot == slot) {
+      ++set.seals;
+    }
+  }
+  return set.seals != 0;
+}
+
+/// One more seal, at the next place that looks erased.
+StorageResult Store::add_seal(Set& set) {
+  std::uint8_t seal[seal_bytes] = {};
+  std::memcpy(seal, seal_magic, sizeof seal_magic);
+  store_u32(seal + 4, set.bytes);
+  store_u32(seal + 8, set.sequence);
+  store_u32(seal + 12, set.crc);
+  store_u32(seal + 16, set.generation);
+  store_u32(seal + seal_bytes - 4, crc32(seal, seal_bytes - 4));
+  for (unsigned copy = 0; copy < most_seals; ++copy) {
+    std::uint8_t there[seal_bytes];
+    if (!read_unit(set.slot, seal_offset(copy), there) || !is_erased(there)) continue;
+    const StorageResult r = write_unit(set.slot, seal_offset(copy), seal);
+    if (r == StorageResult::done) ++set.seals;
+    if (r != StorageResult::failed) return r;
+  }
+  return StorageResult::failed;
+}
+
+void Store::read_marks(unsigned slot) {
+  Marks& marks = marks_[slot];
+  marks = Marks{};
+  for (unsigned k = 0; k < most_marks; ++k) {
+    std::uint8_t mark[unit_bytes];
+    const bool is_read = read_unit(slot, marks_offset + k * unit_bytes, mark);
+    if (is_read && is_erased(mark)) continue;
+    marks.next = static_cast<std::uint8_t>(k + 1);
+    if (is_read && is_whole(mark, mark_magic)) marks.generation[k] = load_u32(mark + 4);
+    if (marks.generation[k] > generation_) generation_ = marks.generation[k];
+  }
+}
+
+/// Marks in the other slot that void a set.
+unsigned Store::marks_against(const Set& set) const {
+  unsigned count = 0;
+  for (const std::uint32_t generation : marks_[set.slot ^ 1U].generation) {
+    if (generation != 0 && generation >= set.generation) ++count;
+  }
+  return count;
+}
+
+/// One mark that voids the other slot's set, of any generation there has been.
+StorageResult Store::add_mark(unsigned slot) {
+  std::uint8_t mark[unit_bytes];
+  make_unit(mark_magic, generation_, mark);
+  Marks& marks = marks_[slot];
+  while (marks.next < most_marks) {
+    const unsigned k = marks.next;
+    const StorageResult r = write_unit(slot, marks_offset + k * unit_bytes, mark);
+    if (r == StorageResult::busy) return r;
+    ++marks.next;
+    if (r == StorageResult::failed) continue;
+    marks.generation[k] = generation_;
+    return r;
+  }
+  return StorageResult::failed;
+}
+
+/// Generation of the commit that was begun in a slot, whose image may be there; 0: none.
+std::uint32_t Store::begun(unsigned slot) {
+  std::uint8_t unit[unit_bytes];
+  return read_unit(slot, begin_offset, unit) && is_whole(unit, begin_magic) ? load_u32(unit + 4) : 0U;
+}
+
+/// True where no marks void a set: one does not void what two seals say.
+bool Store::is_counted(const Set& set) const {
+  const unsigned against = marks_against(set);
+  return set.seals != 0 && (against == 0 || (against == 1 && set.seals > 1));
+}
+
+void Store::erase_at_start(unsigned slot) {
+  if (storage_.erase == nullptr) return;
+  for (unsigned n = 0; n < most_calls; ++n) {
+    const StorageResult r = storage_.erase(storage_.user, slot);
+    if (r == StorageResult::busy) continue;
+    if (r == StorageResult::failed) faults_ |= wire::fault::storage;
+    break;
+  }
+  marks_[slot] = Marks{};
 }
 
 /// Reads a sealed image into the staging memory, which must be idle, and prepares it in model set.index.
 bool Store::load(const Set& set) {
-  if (storage_.read(storage_.user, set.slot, 0, staging_.data(), set.bytes) != StorageResult::done) {
-    faults_ |= wire::fault::storage;
-    return false;
-  }
-  begin_check(set.bytes, set.index);
-  Refusal r = Refusal::none;
-  std::uint32_t detail = 0;
-  while (!check_slice(r, detail)) {
-  }
-  if (r != Refusal::none) {
+  for (unsigned reading = 0; reading < most_readings; ++reading) {
+    if (storage_.read(storage_.user, set.slot, 0, staging_.data(), set.bytes) != StorageResult::done) {
+      faults_ |= wire::fault::storage;
+      continue;
+    }
+    begin_check(set.bytes, set.index);
+    Refusal r = Refusal::none;
+    std::uint32_t detail = 0;
+    while (!check_slice(r, detail)) {
+    }
+    if (r == Refusal::none) return is_in_staging(set);
     refuse(r, detail);
-    return false;
   }
-  return is_in_staging(set);
+  return false;
 }
 
 /// True where the image that was checked is the one that the seal was written for.
@@ -129,16 +271,21 @@ bool Store::is_in_staging(const Set& set) const {
 
 void Store::boot() {
   Set found[2];
-  const bool sealed[2] = {read_seal(0, found[0]), read_seal(1, found[1])};
-  unsigned order[2] = {0, 1};
-  if (sealed[1] && (!sealed[0] || found[1].sequence > found[0].sequence)) {
-    order[0] = 1;
-    order[1] = 0;
+  for (unsigned slot = 0; slot < 2; ++slot) {
+    found[slot].slot = static_cast<std::uint16_t>(slot);
+    read_seals(slot, found[slot]);
+    if (found[slot].generation > generation_) generation_ = found[slot].generation;
   }
+  for (unsigned slot = 0; slot < 2; ++slot) read_marks(slot);
+  const Set &a = found[0], &b = found[1];
+  // Sets of before there were generations have none: their sequences tell.
+  const bool second =
+      b.generation != a.generation ? b.generation > a.generation : is_ahead(b.sequence, a.sequence);
+  const unsigned newest = second ? 1 : 0;
   bool damaged = false;
-  for (const unsigned slot : order) {
-    if (!sealed[slot]) continue;
+  for (const unsigned slot : {newest, newest ^ 1U}) {
     Set& set = found[slot];
+    if (!is_counted(set)) continue;
     if (active_.index != Handover::none) {
       // The other slot is checked for a later rollback, which prepares its model again.
       set.index = 1;
@@ -154,10 +301,47 @@ void Store::boot() {
     }
   }
   previous_.index = Handover::none;
+  settle_start();
   if (active_.index == Handover::none) {
     faults_ |= wire::fault::no_valid_set;
   } else {
     answer(Answer::accepted);
+  }
+}
+
+/// Makes the choice of this start that of every later one, before anything follows from it.
+void Store::settle_start() {
+  if (storage_.write == nullptr) return;
+  const auto repeated = [](auto&& write) {
+    StorageResult r = StorageResult::busy;
+    for (unsigned n = 0; n < most_calls && r == StorageResult::busy; ++n) r = write();
+    return r == StorageResult::done;
+  };
+  if (active_.slot != wire::no_slot) {
+    // Marks that do not suffice to void this set may be all that is left of a restore that was cut.
+    Set other;
+    const unsigned against = marks_against(active_);
+    const unsigned wanted = active_.seals < enough_seals ? active_.seals + 2U : active_.seals;
+    if (against != 0 && !read_seals(active_.slot ^ 1U, other)) erase_at_start(active_.slot ^ 1U);
+    // Those that are there may all be marginal; two that are whole outlast a mark that is.
+    while (active_.seals < wanted && repeated([this] { return add_seal(active_); })) {
+    }
+  }
+  // What may be a seal at another start must not count then.
+  for (unsigned slot = 0; slot < 2; ++slot) {
+    if (slot == active_.slot || slot == previous_.slot) continue;
+    Set seen;
+    seen.slot = static_cast<std::uint16_t>(slot);
+    const bool is_sealed = read_seals(slot, seen);
+    // A sealed set that this firmware refuses keeps its place where there is no other.
+    if (is_sealed && active_.slot == wire::no_slot && is_counted(seen)) continue;
+    const std::uint32_t commit = begun(slot);
+    if (!is_sealed || commit > seen.generation) seen.generation = commit;
+    if (seen.generation <= active_.generation) continue;
+    if (seen.generation > generation_) generation_ = seen.generation;
+    bool is_void = true;
+    while (is_void && marks_against(seen) < 3) is_void = repeated([&] { return add_mark(slot ^ 1U); });
+    if (!is_void) erase_at_start(slot);
   }
 }
 
@@ -298,11 +482,13 @@ void Store::checked(Refusal r, std::uint32_t detail) {
       finish(Answer::no_previous);
       return;
     }
-    job_ = Job::drop_active;
+    begin_commit();
     return;
   }
-  if (r == Refusal::none && header_.sequence <= active_.sequence) {
-    r = Refusal::stale_sequence;
+  const std::uint32_t ahead = header_.sequence - active_.sequence;
+  if (r == Refusal::none &&
+      (header_.sequence == 0 || (active_.sequence != 0 && (ahead == 0 || ahead > most_ahead)))) {
+    r = is_ahead(header_.sequence, active_.sequence) ? Refusal::sequence_too_far : Refusal::stale_sequence;
     detail = active_.sequence;
   }
   if (r != Refusal::none) {
@@ -432,6 +618,7 @@ Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
     return Answer::storage_failed;
   }
   job_trial_ = trial;
+  job_rollback_ = false;
   job_trial_cycles_ = cycles != 0 ? cycles : settings_.trial_cycles;
   if (job_trial_cycles_ == 0) job_trial_cycles_ = 1;
   if (unverified) {
@@ -442,12 +629,32 @@ Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
   return answer(Answer::accepted);
 }
 
+/// The slot for a new set: where none is in use the one that the other's marks void, so that the marks outlast it.
+std::uint16_t Store::target_slot() {
+  if (active_.slot != wire::no_slot) return static_cast<std::uint16_t>(active_.slot ^ 1U);
+  for (std::uint16_t slot = 0; slot < 2; ++slot) {
+    Set seen;
+    seen.slot = slot;
+    const bool is_sealed = read_seals(slot, seen);
+    if ((is_sealed && !is_counted(seen)) || (!is_sealed && begun(slot) != 0)) return slot;
+  }
+  for (std::uint16_t slot = 0; slot < 2; ++slot) {
+    for (const std::uint32_t mark : marks_[slot ^ 1U].generation) {
+      if (mark != 0) return slot;
+    }
+  }
+  return 0;
+}
+
 /// Starts to write what was verified.
 void Store::begin_commit() {
-  incoming_.slot = active_.slot == 0 ? 1 : 0;
+  incoming_.slot = target_slot();
+  incoming_.seals = 0;
+  incoming_.generation = ++generation_;
   state_ = StoreState::working;
-  job_ = Job::erase;
+  job_ = active_.slot == wire::no_slot ? Job::erase : Job::check_active;
   progress_ = 0;
+  check_crc_ = 0;
   faults_ = static_cast<std::uint16_t>(faults_ & ~wire::fault::trial_reverted);
   // From here on the other slot holds nothing that a rollback could use.
   previous_ = Set{};
@@ -477,8 +684,11 @@ Answer Store::rollback() {
   }
   if (state_ != StoreState::idle) return answer(Answer::busy);
   if (previous_.slot == wire::no_slot) return answer(Answer::no_previous);
+  if (storage_.erase == nullptr || storage_.write == nullptr) return answer(Answer::storage_failed);
   std::uint32_t index = 0;
   if (!free_model(index)) return answer(Answer::busy);
+  job_trial_ = false;
+  job_rollback_ = true;
   incoming_ = previous_;
   incoming_.index = index;
   state_ = StoreState::working;
@@ -492,6 +702,8 @@ Answer Store::restore() {
   if (state_ != StoreState::idle) return answer(Answer::busy);
   if (storage_.erase == nullptr) return answer(Answer::storage_failed);
   state_ = StoreState::working;
+  incoming_ = Set{};
+  incoming_.slot = target_slot();
   job_ = Job::clear_other;
   previous_ = Set{};
   return answer(Answer::accepted);
@@ -584,10 +796,34 @@ void Store::work() {
       if (check_slice(verdict, detail)) checked(verdict, detail);
       return;
     }
+    case Job::check_active: {
+      // Until now the other slot may hold the only set that can still be read.
+      std::uint8_t chunk[chunk_bytes];
+      const std::uint32_t end = active_.bytes - std::uint32_t{image::crc_bytes};
+      const std::uint32_t size = end - progress_ < chunk_bytes ? end - progress_ : chunk_bytes;
+      r = storage_.read(storage_.user, active_.slot, progress_, chunk, size);
+      if (r != StorageResult::done) break;
+      check_crc_ = crc32(chunk, size, check_crc_);
+      progress_ += size;
+      if (progress_ != end) break;
+      progress_ = 0;
+      r = check_crc_ == active_.crc ? StorageResult::done : StorageResult::failed;
+      if (r == StorageResult::done) job_ = Job::erase;
+      break;
+    }
     case Job::erase:
       r = storage_.erase(storage_.user, incoming_.slot);
+      if (r == StorageResult::failed) break;
+      marks_[incoming_.slot] = Marks{};
+      if (r == StorageResult::done) job_ = Job::announce;
+      break;
+    case Job::announce: {
+      std::uint8_t unit[unit_bytes];
+      make_unit(begin_magic, incoming_.generation, unit);
+      r = write_unit(incoming_.slot, begin_offset, unit);
       if (r == StorageResult::done) job_ = Job::write;
       break;
+    }
     case Job::write: {
       const std::uint32_t end = rounded_up(incoming_.bytes);
       const std::uint32_t size = end - progress_ < chunk_bytes ? end - progress_ : chunk_bytes;
@@ -612,7 +848,7 @@ void Store::work() {
       progress_ += size;
       if (progress_ != incoming_.bytes) break;
       if (!job_trial_) {
-        job_ = active_.slot == wire::no_slot ? Job::clear_stale : Job::seal;
+        job_ = Job::seal;
         break;
       }
       previous_ = active_;
@@ -631,67 +867,74 @@ void Store::work() {
         return;
       }
       job_trial_ = true;
-      job_ = previous_.slot == wire::no_slot ? Job::clear_stale : Job::seal;
+      job_ = Job::seal;
       break;
-    case Job::clear_stale:
-      // A set that was refused at the start (limits of this firmware, a reading error) may carry a higher
-      // sequence: a later start must not load it in place of this one.
-      r = storage_.erase(storage_.user, incoming_.slot == 0 ? 1U : 0U);
-      if (r == StorageResult::done) job_ = Job::seal;
-      if (r == StorageResult::failed && job_trial_) {
-        make_active(previous_);
-        previous_ = Set{};
-      }
-      break;
-    case Job::seal: {
-      std::uint8_t seal[seal_bytes] = {};
-      std::memcpy(seal, seal_magic, sizeof seal_magic);
-      store_u32(seal + 4, incoming_.bytes);
-      store_u32(seal + 8, incoming_.sequence);
-      store_u32(seal + 12, incoming_.crc);
-      store_u32(seal + seal_bytes - 4, crc32(seal, seal_bytes - 4));
-      r = storage_.write(storage_.user, incoming_.slot, seal_offset, seal, seal_bytes);
-      if (r == StorageResult::done) {
-        Set written;
-        if (!read_seal(incoming_.slot, written) || written.crc != incoming_.crc) r = StorageResult::failed;
-      }
+    case Job::seal:
+      r = add_seal(incoming_);
+      // With one seal the set counts, and the next start adds another.
+      if (r == StorageResult::failed && incoming_.seals != 0)
+        r = StorageResult::done;
+      else if (r == StorageResult::done && incoming_.seals < enough_seals)
+        break;
       if (r == StorageResult::failed) {
-        // The seal may be incomplete: the active set must be the one that the next start would load.
+        // It may be incomplete: the active set must be the one that the next start would load.
         if (job_trial_) {
           make_active(previous_);
           previous_ = Set{};
         }
-        job_ = Job::drop_incoming;
+        progress_ = 0;
+        job_ = Job::void_incoming;
         return;
       }
       if (r != StorageResult::done) break;
-      if (!job_trial_) {
+      faults_ = 0;
+      if (job_rollback_) {
+        job_ = active_.slot == wire::no_slot ? Job::none : Job::drop_left;
+        make_active(incoming_);
+        previous_ = Set{};
+        if (job_ == Job::none) finish(Answer::accepted);
+        break;
+      }
+      if (job_trial_) {
+        active_ = incoming_;
+      } else {
         previous_ = active_;
         make_active(incoming_);
       }
       previous_.index = Handover::none;
-      faults_ = 0;
       finish(Answer::accepted);
       break;
-    }
+    case Job::void_incoming:
+      r = add_mark(incoming_.slot ^ 1U);
+      if (r == StorageResult::busy) break;
+      if (r == StorageResult::failed || ++progress_ == 3) job_ = Job::drop_incoming;
+      r = StorageResult::done;
+      break;
     case Job::drop_incoming:
       r = storage_.erase(storage_.user, incoming_.slot);
       if (r == StorageResult::done) r = StorageResult::failed;  // the commit has failed in any case
       break;
-    case Job::drop_active:
-      r = active_.slot == wire::no_slot ? StorageResult::done : storage_.erase(storage_.user, active_.slot);
-      if (r != StorageResult::done) break;
-      previous_ = Set{};
-      make_active(incoming_);
+    case Job::drop_left:
+      r = storage_.erase(storage_.user, active_.slot ^ 1U);
+      if (r == StorageResult::busy) break;
+      if (r == StorageResult::failed) faults_ |= wire::fault::storage;
       finish(Answer::accepted);
-      break;
+      return;
     case Job::clear_other:
-      r = storage_.erase(storage_.user, active_.slot == 0 ? 1U : 0U);
-      if (r == StorageResult::done) job_ = Job::clear_active;
+      r = storage_.erase(storage_.user, incoming_.slot);
+      if (r != StorageResult::done) break;
+      marks_[incoming_.slot] = Marks{};
+      progress_ = 0;
+      job_ = active_.slot == wire::no_slot ? Job::clear_active : Job::void_active;
+      break;
+    case Job::void_active:
+      r = add_mark(incoming_.slot);
+      if (r == StorageResult::done && ++progress_ == 3) job_ = Job::clear_active;
       break;
     case Job::clear_active:
-      r = storage_.erase(storage_.user, active_.slot == 0 ? 0U : 1U);
+      r = storage_.erase(storage_.user, incoming_.slot ^ 1U);
       if (r != StorageResult::done) break;
+      marks_[incoming_.slot ^ 1U] = Marks{};
       make_active(Set{});
       faults_ = wire::fault::no_valid_set;
       finish(Answer::accepted);
@@ -717,7 +960,7 @@ void Store::poll(std::uint32_t now_ms) {
 bool Store::read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size) {
   if (active_.slot == wire::no_slot || storage_.read == nullptr) return false;
   // Rollback and restore are erasing just this slot.
-  if (job_ == Job::drop_active || job_ == Job::clear_active) return false;
+  if (job_ == Job::clear_active) return false;
   if (offset > active_.bytes || size > active_.bytes - offset) return false;
   if (storage_.read(storage_.user, active_.slot, offset, to, size) != StorageResult::done) {
     faults_ |= wire::fault::storage;

@@ -73,6 +73,7 @@ std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail)
     case Refusal::too_long:
       return fmt::format("{} (of {} bytes)", why, detail);
     case Refusal::stale_sequence:
+    case Refusal::sequence_too_far:
       return fmt::format("{} ({})", why, detail);
     case Refusal::too_large:
     case Refusal::too_steep:

@@ -35,6 +35,7 @@ enum class Refusal : std::uint8_t {
   too_compliant = 20,          ///< gives way to load or force by more than an arm does
   not_allowed_covariate = 21,  ///< follows time or speed
   too_costly = 22,             ///< a step would take too many instructions; the detail is their number
+  sequence_too_far = 23,       ///< a sequence number more than 65,536 above the active one
 };
 
 /// Result of one joint command (docs/compensation.md, C17). Numbers are on the wire: add, never change.
@@ -150,6 +151,8 @@ inline const char* text(Refusal r) {
       return "the image has a term that follows time or speed";
     case Refusal::too_costly:
       return "the image takes more instructions in a control cycle than are allowed";
+    case Refusal::sequence_too_far:
+      return "the sequence number is more than 65,536 above that of the active set";
   }
   return "unknown refusal";
 }

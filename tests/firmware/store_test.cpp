@@ -457,7 +457,10 @@ TEST(Store, AConfirmedTrialStays) {
   ASSERT_EQ(arm.push(image, Command::commit_trial, 1000), Answer::accepted);
   EXPECT_EQ(state(arm), StoreState::trial);
   EXPECT_EQ(arm.pull(), image);
-  { EXPECT_EQ(Arm(arm.flash).sequence(), 0U) << "not before it is confirmed"; }
+  {
+    Flash as_it_is = arm.flash;
+    EXPECT_EQ(Arm(as_it_is).sequence(), 0U) << "not before it is confirmed";
+  }
   EXPECT_EQ(arm.run(Command::confirm), Answer::accepted);
   EXPECT_EQ(static_cast<Answer>(arm.settle().answer), Answer::accepted);
   for (int k = 0; k < 2000; ++k) arm.step();
@@ -524,7 +527,7 @@ TEST(Store, FailingMemoryChangesNothingThatRuns) {
   EXPECT_EQ(bare.store().run(Command::commit, 0, 1), Answer::storage_failed);
 }
 
-// The memory says that the seal could not be written although it was: the client is told that the commit failed,
+// The memory says that no seal could be written although all were: the client is told that the commit failed,
 // so the next start must not bring the set after all.
 TEST(Store, ASealThatFailedIsNotFoundAtTheNextStart) {
   for (const bool trial : {false, true}) {
@@ -534,7 +537,7 @@ TEST(Store, ASealThatFailedIsNotFoundAtTheNextStart) {
     storage.write = [](void* self, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
                        std::uint32_t size) {
       const StorageResult r = static_cast<Flash*>(self)->hooks().write(self, slot, offset, from, size);
-      return offset + size == slot_bytes ? StorageResult::failed : r;
+      return offset >= slot_bytes - 5 * 32 ? StorageResult::failed : r;
     };
     Arm arm(flash);
     arm.device = std::make_unique<Device>(tx60l(), storage, DeviceSettings{});

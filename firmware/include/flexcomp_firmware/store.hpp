@@ -3,19 +3,32 @@
 /// The parameter store: stages a parameter image, verifies it, writes it to non-volatile memory, activates
 /// it, and loads it at the next start. One state machine for every bus.
 ///
-/// Non-volatile memory has two slots. A slot holds the image from its first byte and, in its last 32 bytes, a
-/// seal:
+/// Non-volatile memory has two slots. A slot holds the image from its first byte and, from its end backwards, up to five
+/// equal seals of 32 bytes, before these an announcement and up to 14 marks:
 ///
-///      0  "FLXS"
-///      4  u32 bytes of the image
-///      8  u32 sequence
-///     12  u32 CRC-32 of the image (its last word)
-///     16  12 bytes 0
+///      seal                                    mark, announcement
+///      0  "FLXS"                               0  "FLXM", "FLXB"
+///      4  u32 bytes of the image               4  u32 generation
+///      8  u32 sequence                         8  20 bytes 0
+///     12  u32 CRC-32 of the image             28  u32 CRC-32 of the 28 bytes before
+///     16  u32 generation
+///     20  8 bytes 0
 ///     28  u32 CRC-32 of the 28 bytes before
 ///
-/// The seal is written last, when the image has been read back, so a slot counts only if everything in it is
-/// in order; the power may go at any byte. A set on trial has no seal until it is confirmed. The active slot
-/// is never written; rollback erases it, because then the other one is all there is at the next start.
+/// Every commit has a generation of its own, one above all before; of two sets the higher one is in use. A mark voids the
+/// other slot's set up to its generation. A write or erase that the power cuts may read well at one start and badly at the next,
+/// and where it reads as erased nothing shows that it was begun. Therefore
+///
+/// - a commit erases the slot that is not in use, announces its generation there, writes the image, reads it back, and seals it
+///   three times. The first seal decides, and the announcement before it is there to be seen;
+/// - a start that finds fewer seals than three adds two before it trusts the set; a start that finds an announcement without a seal, or a seal
+///   that it does not trust, voids it by three marks in the other slot before anything is in use. No later start decides otherwise:
+///   two of either are whole;
+/// - one mark voids no set with two seals, so that a slot in use is erased only after three;
+/// - of two slots the one that marks void is erased before the one with the marks;
+/// - the set in use is read again before the other one is erased.
+///
+/// A set on trial has no seal until it is confirmed. Rollback commits the other set anew, then erases the slot that it leaves.
 ///
 /// Everything here runs in the background, in one thread; only the handover word and the models that the
 /// cycle does not use are shared with the control cycle.
@@ -52,7 +65,8 @@ struct Storage {
   /// Makes a whole slot writable. When power goes meanwhile, any of its bytes may be old or erased.
   StorageResult (*erase)(void* user, unsigned slot) = nullptr;
   /// Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot;
-  /// each byte is written once between two erases. Done means that the bytes survive a power loss.
+  /// each byte is written once between two erases, save one whose writing the power has cut and that reads as erased: then
+  /// anything may become of it. Done means that the bytes survive a power loss.
   StorageResult (*write)(void* user, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
                          std::uint32_t size) = nullptr;
 };
@@ -140,20 +154,25 @@ class Store {
     std::uint32_t sequence = 0;
     std::uint32_t bytes = 0;
     std::uint32_t crc = 0;
+    std::uint32_t generation = 0;
+    std::uint8_t seals = 0;  ///< that can be read
   };
   enum class Job : std::uint8_t {
     none,
     load,           ///< rollback: read the set in the other slot
     check,          ///< verify, commit, rollback: the image in the staging memory, in slices
-    erase,          ///< commit: the inactive slot
-    write,          ///< commit: the image
-    compare,        ///< commit: read back
-    clear_stale,    ///< the same where no set was active: erase the slot that no start could use
-    seal,           ///< commit or confirm: the seal
-    drop_incoming,  ///< commit or confirm: erase what may have been sealed although writing the seal failed
+    check_active,   ///< commit, rollback: the set in use is still what it was
+    erase,          ///< the slot that is not in use
+    announce,       ///< the generation, before the image
+    write,          ///< the image
+    compare,        ///< read back
+    seal,           ///< commit or confirm: two seals
+    void_incoming,  ///< commit or confirm: marks, where writing a seal failed
+    drop_incoming,  ///< the same: erase it
     await_confirm,  ///< confirm: until the cycle has ended the trial
-    drop_active,    ///< rollback: erase the slot that is left behind
+    drop_left,      ///< rollback: erase the slot that is left behind
     clear_other,    ///< restore: erase the inactive slot
+    void_active,    ///< restore: three marks in it
     clear_active,   ///< restore: then the active one
   };
 
@@ -189,7 +208,18 @@ class Store {
   void begin_commit();
   std::uint32_t used_model() const;
   bool plausible(const FirmwareModel& model, std::uint32_t pose, std::uint32_t& detail) const;
-  bool read_seal(unsigned slot, Set& set);
+  bool read_unit(unsigned slot, std::uint32_t offset, std::uint8_t* unit);
+  StorageResult write_unit(unsigned slot, std::uint32_t offset, const std::uint8_t* unit);
+  bool read_seals(unsigned slot, Set& set);
+  StorageResult add_seal(Set& set);
+  void read_marks(unsigned slot);
+  unsigned marks_against(const Set& set) const;
+  StorageResult add_mark(unsigned slot);
+  std::uint32_t begun(unsigned slot);
+  std::uint16_t target_slot();
+  bool is_counted(const Set& set) const;
+  void settle_start();
+  void erase_at_start(unsigned slot);
   bool load(const Set& set);
   bool is_in_staging(const Set& set) const;
   /// A check that no commit waits for; its client may give it up.
@@ -221,6 +251,13 @@ class Store {
   Set active_{};
   Set previous_{};  ///< what the other slot holds, or what a trial falls back to
   Set incoming_{};  ///< what is verified, written or on trial
+  /// Marks of a slot: those that are there, and the next place.
+  struct Marks {
+    std::array<std::uint32_t, 14> generation{};  ///< 0: none
+    std::uint8_t next = 0;
+  };
+  std::array<Marks, 2> marks_{};
+  std::uint32_t generation_ = 0;  ///< highest that a seal or a mark has had
   Job job_ = Job::none;
   Check check_ = Check::header;
   Purpose purpose_ = Purpose::verify;
@@ -232,6 +269,7 @@ class Store {
   Admission<Scalar, joints> admission_{};
   std::uint32_t progress_ = 0;
   bool job_trial_ = false;
+  bool job_rollback_ = false;
   std::uint32_t job_trial_cycles_ = 0;
 
   alignas(8) std::array<std::uint8_t, staging_bytes> staging_{};

@@ -181,6 +181,7 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::too_large:
     case Refusal::too_steep:
     case Refusal::too_compliant:
+    case Refusal::sequence_too_far:
     case Refusal::too_costly:
       return abort::value_too_high;
     case Refusal::stale_sequence:
