@@ -170,11 +170,10 @@ void CanopenNode::poll(std::uint32_t now_ms) {
 
 // --- SDO server ---------------------------------------------------------------------------------------
 
-/// Whether a request is the upload of an object of at most 4 bytes, while a transfer runs. Such an upload is one frame and has
-/// no state, so that the transfer need not end: a master that polls an object over the channel, as those do that know
-/// only the default channel of a node, does not disturb the client whose transfer it is.
-bool CanopenNode::is_beside_transfer(const std::uint8_t* frame) const {
-  if (transfer_ == Transfer::none || frame[0] >> 5U != request_specifier::begin_upload) return false;
+/// Whether the object of an initiate request can be uploaded and has at most 4 bytes. Its upload is one frame and has no
+/// state, so it is served while a transfer runs: a master that polls such an object over the only channel that it knows
+/// does not disturb the client whose transfer it is.
+bool CanopenNode::is_small(const std::uint8_t* frame) {
   std::uint32_t code = co::abort::none;
   const Entry* entry = find(load_u16(frame + 1), frame[3], code);
   return entry != nullptr && entry->access != Access::wo && entry->size != 0 && entry->size <= 4;
@@ -197,7 +196,8 @@ void CanopenNode::upload_beside(const std::uint8_t* frame) {
 }
 
 void CanopenNode::request(const std::uint8_t* frame) {
-  if (is_beside_transfer(frame)) {
+  const bool polls = frame[0] >> 5U == request_specifier::begin_upload;
+  if (transfer_ != Transfer::none && polls && is_small(frame)) {
     // Does not prolong a transfer that its client has left.
     upload_beside(frame);
     return;

@@ -64,7 +64,7 @@ class CanopenNode {
   std::uint32_t complete();
   std::uint32_t set(const std::uint8_t* bytes, std::uint32_t size);
   std::uint32_t get(std::uint32_t& size, std::uint8_t* out);
-  bool is_beside_transfer(const std::uint8_t* frame) const;
+  static bool is_small(const std::uint8_t* frame);
   void upload_beside(const std::uint8_t* frame);
   std::uint32_t command(wire::Command command, std::uint32_t argument);
   bool staging() const;
