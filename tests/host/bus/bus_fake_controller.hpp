@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct Controller {
   int busy = 0;           ///< so many commands are answered busy
   int commits_lost = 0;   ///< so many commits do nothing
   int working_polls = 0;  ///< so many status records say that memory is being written
+  std::function<void()> on_commit;
   bool damages_image = false;
   bool overtaken = false;  ///< another client's command is answered before ours is looked at
 
@@ -78,6 +80,7 @@ struct Controller {
         status.state = static_cast<std::uint16_t>(wire::StoreState::verified);
         return answer(Answer::accepted);
       case wire::Command::commit:
+        if (on_commit) on_commit();
         if (commits_lost > 0) {
           --commits_lost;
           return answer(Answer::accepted);

@@ -39,7 +39,8 @@ class ModbusServer {
  public:
   fake::Controller device;
   std::atomic<bool> silent{false};
-  std::atomic<int> lose{0};  ///< so many answers are lost
+  std::atomic<int> lose{0};                ///< so many answers are lost
+  std::atomic<bool> loses_commits{false};  ///< of commits; over TCP the connection ends with them
 
   explicit ModbusServer(bool serial) : serial_(serial) {
     if (serial) {
@@ -187,6 +188,11 @@ class ModbusServer {
       --lose;
       return;
     }
+    const auto command = static_cast<wire::Command>(at(map::command)[0]);
+    if (loses_commits && to == map::argument && count != 0 && command == wire::Command::commit) {
+      if (!serial_) ::shutdown(modbus_get_socket(context_), SHUT_RDWR);
+      return;
+    }
     if (answered != wire::Answer::accepted) {
       modbus_reply_exception(context_, query,
                              answered == wire::Answer::busy ? MODBUS_EXCEPTION_SLAVE_OR_SERVER_BUSY
@@ -260,6 +266,29 @@ TEST_P(ModbusClient, JudgesACommitByWhatItDid) {
   EXPECT_EQ(server.device.active.size(), 100U);
   server.device.commit_ends = wire::Answer::wrong_state;
   EXPECT_THROW(push_image(*client, numbered_image(100, 2)), RefusedByController);
+}
+
+TEST_P(ModbusClient, ACommitWhoseAnswerIsLostIsJudgedByTheStatus) {
+  server.loses_commits = true;
+  const auto client = server.client();
+  EXPECT_EQ(push_image(*client, numbered_image(100, 4)).active_sequence, 4U);
+  server.device.commit_ends = wire::Answer::storage_failed;
+  EXPECT_THAT(thrown<RefusedByController>([&] { push_image(*client, numbered_image(100, 5)); }).what(),
+              HasSubstr("non-volatile memory failed"));
+  EXPECT_EQ(server.device.status.active_sequence, 4U);
+}
+
+TEST_P(ModbusClient, AControllerThatGoesAwayAfterTheCommitLeavesItOpen) {
+  server.loses_commits = true;
+  const auto client = server.client();
+  // The last window has gone out: announce and verify are answered, the commit and all after it are not.
+  server.device.on_commit = [this] { server.silent = true; };
+  const OutcomeOpen e = thrown<OutcomeOpen>([&] { push_image(*client, numbered_image(100, 4)); });
+  EXPECT_THAT(e.what(), HasSubstr(": open: the controller was asked to commit the set, then: "));
+  server.silent = false;
+  server.loses_commits = false;
+  EXPECT_TRUE(read_back(*client, numbered_image(100, 4)).has_value());
+  EXPECT_FALSE(read_back(*client, numbered_image(100, 5)).has_value());
 }
 
 TEST_P(ModbusClient, FindsADamagedSet) {
