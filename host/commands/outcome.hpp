@@ -14,6 +14,10 @@ namespace flexcomp::host {
 
 /// A command's work on a controller. It connects by itself, so that who cannot be reached is told in one of the words as well.
 struct OutcomeTask {
+  OutcomeTask() = default;
+  OutcomeTask(const OutcomeTask&) = delete;
+  OutcomeTask& operator=(const OutcomeTask&) = delete;
+
   std::unique_ptr<ControllerClient> client;  ///< once there is one
   Json result;  ///< "outcome" and "why" are added, and written also for refused and open
   /// Whether a set of an earlier call may still become active. Who cannot be asked is then open, not refused.
