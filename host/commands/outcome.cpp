@@ -30,10 +30,11 @@ void end(const BusOptions& bus, OutcomeTask& task, const char* word, const std::
 
 }  // namespace
 
+OutcomeTask::OutcomeTask(const BusOptions& bus, bool is_undecided)
+    : result{{"bus", bus.bus.text()}}, undecided(is_undecided) {}
+
 void run_to_outcome(const BusOptions& bus, const std::function<void(OutcomeTask&)>& work, bool undecided) {
-  OutcomeTask task;
-  task.undecided = undecided;
-  task.result["bus"] = bus.bus.text();
+  OutcomeTask task(bus, undecided);
   const auto refuse = [&](const BusError& e, bool silent) {
     const std::string why = e.text() + (silent ? "" : what_runs(task));
     end(bus, task, "refused", why);

@@ -14,7 +14,7 @@ namespace flexcomp::host {
 
 /// A command's work on a controller. It connects by itself, so that who cannot be reached is told in one of the words as well.
 struct OutcomeTask {
-  OutcomeTask() = default;
+  OutcomeTask(const BusOptions& bus, bool is_undecided);
   OutcomeTask(const OutcomeTask&) = delete;
   OutcomeTask& operator=(const OutcomeTask&) = delete;
 
