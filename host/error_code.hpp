@@ -33,6 +33,7 @@ enum class ErrorCode {
   no_can_sockets,
   bus_not_opened,
   unknown_robot,  ///< the controller does not tell which
+  outcome_open,   ///< of a command that may have been executed
   // exchange/
   not_xml,
   another_arm,

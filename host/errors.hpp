@@ -15,7 +15,7 @@ enum class ExitStatus : int {
   usage = 2,           ///< wrong command line, ArgumentError
   input_refused = 3,   ///< InputError
   bus = 4,             ///< BusError
-  not_trustworthy = 5  ///< DoubtfulResult
+  not_trustworthy = 5  ///< DoubtfulResult, also a push that ended open
 };
 
 /// What an error is about beside its message.
@@ -32,11 +32,13 @@ class CodedError : public std::runtime_error {
 class BusError : public CodedError {
  public:
   BusError(const std::string& address, const std::string& text, ErrorCode code = ErrorCode::none)
-      : CodedError(address + ": " + text, code), address_(address) {}
+      : CodedError(address + ": " + text, code), address_(address), text_(text) {}
   const std::string& address() const { return address_; }
+  const std::string& text() const { return text_; }  ///< without the address
 
  private:
   std::string address_;
+  std::string text_;
 };
 
 /// An argument of a call that does not suit the other input. What it is called is the caller's to say.

@@ -89,6 +89,7 @@ bool CanopenNode::staging() const { return index_ == co::image && sub_ == co::im
 void CanopenNode::forget() {
   if (transfer_ == Transfer::download && staging()) device_.store().disconnect(origin_);
   transfer_ = Transfer::none;
+  repeatable_ = Transfer::none;
 }
 
 void CanopenNode::reply(const std::uint8_t* frame) {
@@ -161,14 +162,46 @@ void CanopenNode::poll(std::uint32_t now_ms) {
     if (transmit_.send != nullptr && transmit_.send(transmit_.user, heartbeat, beat, 1))
       heartbeat_ms_ = now_ms;
   }
-  if (transfer_ != Transfer::none && now_ms - touched_ms_ >= settings_.sdo_timeout_ms) {
-    abort(co::abort::timeout);
+  if (now_ms - touched_ms_ >= settings_.sdo_timeout_ms) {
+    if (transfer_ != Transfer::none) abort(co::abort::timeout);
+    repeatable_ = Transfer::none;
   }
 }
 
 // --- SDO server ---------------------------------------------------------------------------------------
 
+/// Whether the object of an initiate request can be uploaded and has at most 4 bytes. Its upload is one frame and has no
+/// state, so it is served while a transfer runs: a master that polls such an object over the only channel that it knows
+/// does not disturb the client whose transfer it is.
+bool CanopenNode::is_small(const std::uint8_t* frame) {
+  std::uint32_t code = co::abort::none;
+  const Entry* entry = find(load_u16(frame + 1), frame[3], code);
+  return entry != nullptr && entry->access != Access::wo && entry->size != 0 && entry->size <= 4;
+}
+
+void CanopenNode::upload_beside(const std::uint8_t* frame) {
+  const std::uint16_t index = index_;
+  const std::uint8_t sub = sub_;
+  index_ = load_u16(frame + 1);
+  sub_ = frame[3];
+  std::uint8_t answer[8] = {};
+  std::uint32_t size = 0;
+  const std::uint32_t code = get(size, answer + 4);
+  answer[0] = code == co::abort::none ? static_cast<std::uint8_t>(0x43U | ((4U - size) << 2U)) : 0x80U;
+  if (code != co::abort::none) store_u32(answer + 4, code);
+  std::memcpy(answer + 1, frame + 1, 3);
+  index_ = index;
+  sub_ = sub;
+  reply(answer);
+}
+
 void CanopenNode::request(const std::uint8_t* frame) {
+  const bool polls = frame[0] >> 5U == request_specifier::begin_upload;
+  if (transfer_ != Transfer::none && polls && is_small(frame)) {
+    // Does not prolong a transfer that its client has left.
+    upload_beside(frame);
+    return;
+  }
   touched_ = true;
   switch (frame[0] >> 5U) {
     case request_specifier::download_segment:
@@ -289,7 +322,14 @@ void CanopenNode::begin_download(const std::uint8_t* frame) {
 // Download segment. t: toggle, n: bytes without data, c: last segment.
 //   request   byte 0: 000 t nnn c    1-7: data
 //   response  byte 0: 001 t 0000     1-7: 0
+// The segment before once more, byte for byte, is one that was doubled, or whose response was lost: it is not stored
+// again, its response is repeated.
 void CanopenNode::download_segment(const std::uint8_t* frame) {
+  std::uint8_t answer[8] = {static_cast<std::uint8_t>(0x20U | (frame[0] & toggle_bit))};
+  if (repeatable_ == Transfer::download && std::memcmp(segment_.data(), frame, segment_.size()) == 0) {
+    reply(answer);
+    return;
+  }
   if (transfer_ != Transfer::download) {
     abort(co::abort::command);
     return;
@@ -306,8 +346,9 @@ void CanopenNode::download_segment(const std::uint8_t* frame) {
     return;
   }
   if (last) transfer_ = Transfer::none;
-  const std::uint8_t answer[8] = {static_cast<std::uint8_t>(0x20U | (toggle_ ? toggle_bit : 0U))};
   toggle_ = !toggle_;
+  repeatable_ = Transfer::download;
+  std::memcpy(segment_.data(), frame, segment_.size());
   reply(answer);
 }
 
@@ -321,7 +362,7 @@ void CanopenNode::begin_upload(const std::uint8_t* frame) {
   const Entry* entry = find(index_, sub_, code);
   if (entry != nullptr && entry->access == Access::wo) code = co::abort::write_only;
   std::uint32_t size = 0;
-  if (code == co::abort::none) code = get(size);
+  if (code == co::abort::none) code = get(size, scratch_.data());
   if (code != co::abort::none) {
     abort(code);
     return;
@@ -345,7 +386,12 @@ void CanopenNode::begin_upload(const std::uint8_t* frame) {
 // Upload segment.
 //   request   byte 0: 011 t 0000     1-7: 0
 //   response  byte 0: 000 t nnn c    1-7: data
+// The response before is repeated where its request comes once more.
 void CanopenNode::upload_segment(const std::uint8_t* frame) {
+  if (repeatable_ == Transfer::upload && (segment_[0] & toggle_bit) == (frame[0] & toggle_bit)) {
+    reply(segment_.data());
+    return;
+  }
   if (transfer_ != Transfer::upload) {
     abort(co::abort::command);
     return;
@@ -373,6 +419,8 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
   answer[0] = static_cast<std::uint8_t>((toggle_ ? toggle_bit : 0U) | ((7U - n) << 1U) | (last ? 1U : 0U));
   toggle_ = !toggle_;
   if (last) transfer_ = Transfer::none;
+  repeatable_ = Transfer::upload;
+  std::memcpy(segment_.data(), answer, segment_.size());
   reply(answer);
 }
 
@@ -413,13 +461,12 @@ std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
   }
 }
 
-/// Copies the value of the selected object to scratch_; of the active image only its size.
-std::uint32_t CanopenNode::get(std::uint32_t& size) {
+/// Copies the value of the selected object to `out`, at least 4 bytes; of the active image only its size.
+std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
   std::uint32_t code = co::abort::none;
   const Entry* entry = find(index_, sub_, code);
   if (entry == nullptr) return code;
   size = entry->size;
-  std::uint8_t* out = scratch_.data();
   std::uint32_t number = 0;
   switch (index_) {
     case co::device_type:

@@ -28,6 +28,7 @@ namespace {
 namespace co = wire::canopen;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+using namespace std::chrono_literals;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
@@ -84,7 +85,7 @@ class CanopenClient final : public ControllerClient {
                 Descriptor socket)
       : ControllerClient(address, options),
         node_(std::get<CanAddress>(address.at).node),
-        timeout_(options.response_timeout / attempts),
+        timeout_(options.response_timeout),
         channel_(std::move(channel)),
         socket_(std::move(socket)),
         sdo_(socket_.get(), node_, timeout_) {
@@ -102,20 +103,21 @@ class CanopenClient final : public ControllerClient {
   }
 
   void send_image(std::span<const std::uint8_t> image, const Progress& progress) override {
-    // A lost frame repeats the whole transfer: the server drops an aborted one.
-    download({co::image, co::image_staging}, image, attempts, progress);
+    // A transfer that was broken off leaves nothing at the server: it may be begun anew.
+    download({co::image, co::image_staging}, image, progress);
   }
 
   void send_command(wire::Command command, std::uint32_t argument) override {
     std::array<std::uint8_t, 4> bytes{};
     if (argument != 0 || last_argument_ != 0) {
       store_u32(bytes.data(), argument);
-      download({co::command, co::command_argument}, bytes, attempts);
+      download({co::command, co::command_argument}, bytes);
       last_argument_ = argument;
     }
     store_u16(bytes.data(), static_cast<std::uint16_t>(command));
     // Sent once: a command whose answer got lost may have been executed.
-    download({co::command, co::command_number}, std::span(bytes).first(2), 1);
+    const ObjectAddress object{co::command, co::command_number};
+    repeat("to write", object, 0ms, [&] { sdo_.download_once(object, std::span(bytes).first(2)); });
   }
 
   Bytes read_image(std::size_t size, const Progress& progress) override {
@@ -123,16 +125,18 @@ class CanopenClient final : public ControllerClient {
   }
 
   Bytes exchange_probe(std::span<const std::uint8_t> request) override {
-    download({co::probe, co::probe_request}, request, attempts);
+    download({co::probe, co::probe_request}, request);
     return upload({co::probe, co::probe_response}, wire::probe_response_bytes);
   }
 
  private:
-  static constexpr int attempts = 3;
+  /// A transfer that is disturbed again and again is given up after so many response times.
+  static constexpr int disturbed_response_times = 10;
 
   Bytes upload(ObjectAddress object, std::size_t size, const Progress& progress = {}) {
     Bytes out;
-    retry("to read", object, attempts, [&] { out = sdo_.upload(object, progress); });
+    repeat("to read", object, disturbed_response_times * timeout_,
+           [&] { out = sdo_.upload(object, progress); });
     if (out.size() != size) {
       throw BusError(where(), fmt::format("object {} of node {} has {} bytes, expected {}", object.text(),
                                           node_, out.size(), size));
@@ -140,34 +144,58 @@ class CanopenClient final : public ControllerClient {
     return out;
   }
 
-  void download(ObjectAddress object, std::span<const std::uint8_t> data, int times,
-                const Progress& progress = {}) {
-    retry("to write", object, times, [&] { sdo_.download(object, data, progress); });
+  void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {}) {
+    repeat("to write", object, disturbed_response_times * timeout_,
+           [&] { sdo_.download(object, data, progress); });
   }
 
+  /// What was on the channel besides since `before`, for a message.
+  std::string besides(const SdoDisturbances& before) const {
+    SdoDisturbances now = sdo_.disturbances();
+    now.lost -= before.lost;
+    now.doubled -= before.doubled;
+    now.foreign -= before.foreign;
+    if (!now.any()) return {};
+    return fmt::format("; seen meanwhile: {}{}", now.text(),
+                       now.foreign != 0 ? " (another master uses this node's SDO channel)" : "");
+  }
+
+  /// Begins a transfer anew until it gets through, for at most this long.
   template <class Transfer>
-  void retry(const char* what, ObjectAddress object, int times, const Transfer& transfer) {
+  void repeat(const char* what, ObjectAddress object, milliseconds longest, const Transfer& transfer) {
+    const SdoDisturbances before = sdo_.disturbances();
+    const auto start = steady_clock::now();
+    milliseconds pause{2};
     for (int attempt = 1;; ++attempt) {
       try {
         transfer();
         return;
       } catch (const SdoAbort& e) {
-        // After a lost frame the server aborts with one of these codes.
-        const bool lost = !e.by_server() || e.code() == co::abort::toggle || e.code() == co::abort::timeout ||
-                          e.code() == co::abort::command;
-        if (lost && attempt < times) continue;
-        if (!e.by_server()) throw BusError(where(), fmt::format("node {}: {}", node_, e.what()));
-        throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
-      } catch (const SdoTimeout& e) {
-        if (attempt < times) continue;
-        throw NoAnswer(
-            where(),
-            fmt::format("node {} did not answer when asked {} object {} ({} of {:.2f} s): {}", node_, what,
-                        object.text(), times == 1 ? "one wait" : fmt::format("{} waits", times),
-                        in_seconds(timeout_), e.what()));
+        // A lost or doubled frame, or another client's transfer, ends in one of these codes.
+        const bool disturbed = !e.by_server() || e.code() == co::abort::toggle ||
+                               e.code() == co::abort::timeout || e.code() == co::abort::command;
+        if (!disturbed)
+          throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
+        if (steady_clock::now() - start >= longest) {
+          throw BusError(where(),
+                         fmt::format("node {}: asked {} object {}, the transfer was broken off {} "
+                                     "within {:.1f} s, at last by {}{}",
+                                     node_, what, object.text(),
+                                     attempt == 1 ? "once" : fmt::format("{} times", attempt),
+                                     std::chrono::duration<double>(steady_clock::now() - start).count(),
+                                     e.what(), besides(before)));
+        }
+      } catch (const SdoTimeout&) {
+        throw NoAnswer(where(), fmt::format("node {} did not answer for {:.2f} s when asked {} object {}{}",
+                                            node_, in_seconds(longest == 0ms ? timeout_ / 4 : timeout_), what,
+                                            object.text(), besides(before)));
       } catch (const std::system_error& e) {
         throw BusError(where(), fmt::format("{}", e.what()));
       }
+      sdo_.await_silence();
+      // Not in step with a master that asks at a fixed rate.
+      std::this_thread::sleep_for(pause);
+      pause = std::min(2 * pause, milliseconds(67));
     }
   }
 

@@ -20,32 +20,32 @@ constexpr milliseconds polling_interval{10};
 /// Limit of the length that a controller may announce, bytes.
 constexpr std::size_t longest_image = std::size_t{1} << 24U;
 
-/// Commands that a controller accepts and then works on. A verify that it answers at once, as older ones do, is over by the
-/// first look at the status.
-bool takes_a_while(wire::Command command) {
-  return command == wire::Command::verify || command == wire::Command::commit ||
-         command == wire::Command::commit_trial || command == wire::Command::confirm ||
-         command == wire::Command::rollback || command == wire::Command::restore_defaults;
+bool is(const wire::Status& status, wire::StoreState state) {
+  return status.state == static_cast<std::uint16_t>(state);
 }
 
-/// Tells from the active set whether a command took effect. The status has the answer to the last command of
-/// any client, so that the answer alone proves nothing.
-bool took_effect(wire::Command command, const wire::Status& before, const wire::Status& now) {
-  constexpr auto trial = static_cast<std::uint16_t>(wire::StoreState::trial);
-  const bool other_set = now.active_slot != before.active_slot ||
-                         now.active_sequence != before.active_sequence || now.active_crc != before.active_crc;
+/// Whether a verify has passed.
+bool is_verified(const wire::Status& now) {
+  // An answer that is another client's is noticed at the commit, which verifies anew where it has to.
+  return is(now, wire::StoreState::verified) ||
+         (now.answer == static_cast<std::uint16_t>(wire::Answer::accepted) && now.refusal == 0);
+}
+
+/// Whether the store still has what the command is about, so that a command that is under way would take effect.
+bool may_still_come(wire::Command command, const wire::Status& now) {
   switch (command) {
-    case wire::Command::verify:
-      // An answer that is another client's is noticed at the commit, which verifies anew where it has to.
-      return now.state == static_cast<std::uint16_t>(wire::StoreState::verified) ||
-             (now.answer == static_cast<std::uint16_t>(wire::Answer::accepted) && now.refusal == 0);
     case wire::Command::confirm:
-      return now.state != trial && !other_set;
-    case wire::Command::restore_defaults:
-      return now.active_slot == wire::no_slot;
+      return is(now, wire::StoreState::trial);
+    case wire::Command::rollback:
+      return now.previous_sequence != 0 || is(now, wire::StoreState::trial);
     default:
-      return other_set;
+      return is(now, wire::StoreState::receiving) || is(now, wire::StoreState::verified);
   }
+}
+
+std::string set_text(const wire::Status& now) {
+  return now.active_slot == wire::no_slot ? "no set is active"
+                                          : fmt::format("set {} runs", now.active_sequence);
 }
 
 }  // namespace
@@ -147,29 +147,162 @@ void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress
 
 void ControllerClient::run(wire::Command command, std::uint32_t argument) {
   const std::string what = describe(command);
-  const bool background = takes_a_while(command);
-  const wire::Status before = background ? status() : wire::Status();
-  retry_while_busy(what, [&] { send_command(command, argument); });
+  const bool background = command == wire::Command::verify;
+  const auto start = steady_clock::now();
+  const auto end = start + options_.write_timeout;
+  const auto send = [&] { retry_while_busy(what, [&] { send_command(command, argument); }); };
+  bool answered = false;
+  while (!answered) {
+    try {
+      send();
+      answered = true;
+    } catch (const NoAnswer&) {
+      // Each of these commands may be given twice.
+      if (steady_clock::now() - start > options_.response_timeout) throw;
+      if (!background) continue;
+      const wire::Status now = status();
+      answered = is(now, wire::StoreState::working) || is(now, wire::StoreState::verified) ||
+                 now.answer == static_cast<std::uint16_t>(wire::Answer::refused);
+    }
+  }
   if (!background) return;
-  const auto end = steady_clock::now() + options_.write_timeout;
   for (;;) {
     const wire::Status now = status();
-    if (now.state != static_cast<std::uint16_t>(wire::StoreState::working)) {
+    if (!is(now, wire::StoreState::working)) {
+      if (is_verified(now)) return;
       const auto answer = static_cast<wire::Answer>(now.answer);
       const auto refusal = static_cast<Refusal>(now.refusal);
-      if (took_effect(command, before, now)) return;
-      const std::string why = answer == wire::Answer::accepted
-                                  ? "nothing has changed, and the reason is overtaken by another client"
-                                  : describe(answer, refusal, now.detail);
-      throw RefusedByController(where_, fmt::format("asked to {}, the controller failed: {}", what, why),
-                                answer, refusal);
+      throw RefusedByController(
+          where_,
+          fmt::format("asked to {}, the controller failed: {}", what, describe(answer, refusal, now.detail)),
+          answer, refusal);
     }
     if (steady_clock::now() > end) {
-      throw NoAnswer(
-          where_, fmt::format("asked to {}, the controller is still writing its memory after {:.1f} s", what,
-                              in_seconds(options_.write_timeout)));
+      throw NoAnswer(where_, fmt::format("asked to {}, the controller is still working after {:.1f} s", what,
+                                         in_seconds(options_.write_timeout)));
     }
     std::this_thread::sleep_for(polling_interval);
+  }
+}
+
+/// How long a controller is asked what became of a command.
+class ControllerClient::Patience {
+ public:
+  explicit Patience(const ClientOptions& options)
+      : silence_(3 * options.response_timeout),
+        silent_until_(steady_clock::now() + silence_),
+        working_until_(steady_clock::now() + options.write_timeout) {}
+  void heard() {
+    silent_until_ = steady_clock::now() + silence_;
+    pause_ = polling_interval;
+  }
+  bool is_over() const { return steady_clock::now() > silent_until_; }
+  bool has_worked_too_long() const { return steady_clock::now() > working_until_; }
+  void wait() {
+    std::this_thread::sleep_for(pause_);
+    pause_ = std::min(2 * pause_, milliseconds(300));
+  }
+  milliseconds silence() const { return silence_; }
+
+ private:
+  milliseconds silence_;
+  steady_clock::time_point silent_until_;
+  steady_clock::time_point working_until_;
+  milliseconds pause_ = polling_interval;
+};
+
+/// The status of a store that is not working; nothing where it has to be asked for again.
+std::optional<wire::Status> ControllerClient::status_or_wait(Patience& patience,
+                                                             const std::string& question) {
+  try {
+    const wire::Status now = status();
+    patience.heard();
+    if (!is(now, wire::StoreState::working)) return now;
+    if (patience.has_worked_too_long()) {
+      throw OutcomeOpen(where_, fmt::format("{}: the controller is still writing its memory after {:.1f} s",
+                                            question, in_seconds(options_.write_timeout)));
+    }
+  } catch (const BusError& e) {
+    if (patience.is_over()) {
+      throw OutcomeOpen(where_, fmt::format("{}: its status could not be read for {:.1f} s ({})", question,
+                                            in_seconds(patience.silence()), e.text()));
+    }
+  }
+  patience.wait();
+  return std::nullopt;
+}
+
+wire::Status ControllerClient::settled_status(const std::string& question) {
+  Patience patience(options_);
+  for (;;) {
+    if (const auto now = status_or_wait(patience, question)) return *now;
+  }
+}
+
+wire::Status ControllerClient::conclude(wire::Command command, std::uint32_t argument,
+                                        const Reached& reached) {
+  const std::string what = describe(command);
+  std::string first_error;  // of the bus, after the command may have gone out
+  std::optional<RefusedByController> refusal;
+  bool answered = false;
+  const auto give = [&] {
+    try {
+      retry_while_busy(what, [&] { send_command(command, argument); });
+      answered = true;
+    } catch (const RefusedByController& e) {
+      if (!refusal) refusal = e;
+    } catch (const BusError& e) {
+      if (first_error.empty()) first_error = e.text();
+    }
+  };
+  const unsigned connection_before = connection();
+  const auto start = steady_clock::now();
+  give();
+  Patience patience(options_);
+  bool dropped = false;
+  for (;;) {
+    std::string question = fmt::format("the controller was asked to {}", what);
+    if (!first_error.empty()) question += fmt::format(", then: {}", first_error);
+    const std::optional<wire::Status> now = status_or_wait(patience, question);
+    if (!now) continue;
+    if (reached(*now)) return *now;
+    // Neither done nor being done. A command that is lost is given again, and one that may be late must find nothing
+    // before the controller is said not to have executed it.
+    const bool could = may_still_come(command, *now);
+    const bool same_connection = connection() == connection_before;
+    const bool is_rollback = command == wire::Command::rollback;
+    const bool in_time = steady_clock::now() - start < patience.silence();
+    if (could && !refusal && in_time && !(is_rollback && answered)) {
+      // Two rollbacks are not one, and what is staged belongs to its connection.
+      const bool may_repeat = !is_rollback && (same_connection || command == wire::Command::confirm);
+      patience.wait();
+      if (may_repeat) give();
+      continue;
+    }
+    const bool staged = is(*now, wire::StoreState::receiving) || is(*now, wire::StoreState::verified);
+    if (could && staged && same_connection && !dropped) {
+      dropped = true;
+      try {
+        run(wire::Command::abort);
+      } catch (const BusError&) {
+        // The next status says whether it is still there.
+      }
+      continue;
+    }
+    if (could && !refusal && !(is_rollback && same_connection)) {
+      throw OutcomeOpen(where_, fmt::format("{}; it has not, but still may: {}", question, set_text(*now)));
+    }
+    if (refusal) throw RefusedByController(*refusal);
+    const auto answer = static_cast<wire::Answer>(now->answer);
+    const auto reason = static_cast<Refusal>(now->refusal);
+    std::string why = "nothing has changed: it was started anew, or another client came between";
+    if (answer != wire::Answer::accepted && answer != wire::Answer::busy) {
+      why = describe(answer, reason, now->detail);
+    } else if (!first_error.empty()) {
+      why = fmt::format("the command never got there: {}", first_error);
+    }
+    throw RefusedByController(where_, fmt::format("asked to {}, the controller failed: {}", what, why),
+                              answer, reason);
   }
 }
 

@@ -30,8 +30,8 @@ inline double in_seconds(std::chrono::milliseconds t) { return std::chrono::dura
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 struct ClientOptions {
-  /// Time limit of a response. On CAN and serial lines, where frames get lost, three attempts share it; on a
-  /// serial line the transmission time is added.
+  /// Time limit of a response. Where frames get lost, several attempts share it; on a serial line the transmission time
+  /// is added.
   std::chrono::milliseconds response_timeout{3000};
   /// Time limit for erasing and writing non-volatile memory.
   std::chrono::milliseconds write_timeout{20000};
@@ -57,6 +57,21 @@ class NoAnswer : public BusError {
   using BusError::BusError;
 };
 
+/// A command went out, and what became of it cannot be told now. Message: `can:vcan0:5: open: …`.
+class OutcomeOpen : public DoubtfulResult {
+ public:
+  OutcomeOpen(const std::string& address, const std::string& text)
+      : DoubtfulResult(address + ": open: " + text, ErrorCode::outcome_open),
+        address_(address),
+        text_(text) {}
+  const std::string& address() const { return address_; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string address_;
+  std::string text_;
+};
+
 /// Connection to one controller. Every member throws BusError, whose message names the address and the request.
 class ControllerClient {
  public:
@@ -77,9 +92,23 @@ class ControllerClient {
   /// Transfers an image into the staging area. The active set does not change.
   void stage(std::span<const std::uint8_t> image, const Progress& progress = {});
 
-  /// Executes a store command, and waits for its end where it writes non-volatile memory. A busy controller is asked
-  /// again until response_timeout. \throws RefusedByController with the controller's reason
+  /// Executes a store command that changes no active set (begin, verify, abort), and waits for its end. A busy controller
+  /// is asked again until response_timeout. \throws RefusedByController with the controller's reason
   void run(wire::Command command, std::uint32_t argument = 0);
+
+  /// Tells from a status whether a command took effect.
+  using Reached = std::function<bool(const wire::Status&)>;
+
+  /// Executes a store command that changes the active set, and says what became of it by the controller's status alone:
+  /// an answer may be lost, late, or another client's. After any error the status is asked for again, over a new
+  /// connection where the old one is broken, until the controller has kept silent for three response times, or has worked
+  /// for write_timeout. Returns the status that says so where the command took effect.
+  /// \throws BusError  it did not, and cannot any more: the controller runs what it ran before
+  /// \throws OutcomeOpen  this cannot be told
+  wire::Status conclude(wire::Command command, std::uint32_t argument, const Reached& reached);
+
+  /// The status, once the store is no longer working; asked for as by conclude(). \throws OutcomeOpen
+  wire::Status settled_status(const std::string& question);
 
   /// Reads the active image, consistent: the same set was active before and after. Empty where there is none.
   Bytes active_image(const Progress& progress = {});
@@ -102,7 +131,8 @@ class ControllerClient {
   /// Reads the capability record and refuses an unknown protocol. To be called once the bus is open.
   void read_capability();
 
-  // Primitives of a bus. Each throws BusRefusal where the controller refuses and BusError where it does not respond.
+  // Primitives of a bus. Each throws BusRefusal where the controller refuses and BusError where it does not respond; after
+  // an error that broke the connection the next one opens it anew.
   virtual wire::ByteOrder byte_order() const = 0;
   virtual Bytes read_record(Record record, std::size_t size) = 0;
   virtual void send_image(std::span<const std::uint8_t> image, const Progress& progress) = 0;
@@ -110,9 +140,15 @@ class ControllerClient {
   virtual Bytes read_image(std::size_t size, const Progress& progress) = 0;
   virtual Bytes exchange_probe(std::span<const std::uint8_t> request) = 0;
 
+  /// Number of the connection: what was sent over an earlier one may still arrive. 0 where the bus keeps the order.
+  virtual unsigned connection() const { return 0; }
+
   const ClientOptions& options() const { return options_; }
 
  private:
+  class Patience;
+  std::optional<wire::Status> status_or_wait(Patience& patience, const std::string& question);
+
   template <class Action>
   void retry_while_busy(const std::string& request, const Action& action);
   [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& from_bus);

@@ -47,15 +47,18 @@ class ModbusClient final : public ControllerClient {
  public:
   ModbusClient(const BusAddress& address, const ClientOptions& options) : ControllerClient(address, options) {
     if (const auto* tcp = std::get_if<ModbusTcpAddress>(&address.at)) {
+      is_tcp_ = true;
       open_tcp(*tcp);
     } else {
       open_rtu(std::get<ModbusRtuAddress>(address.at));
     }
+    connect();
     read_capability();
   }
 
  protected:
   wire::ByteOrder byte_order() const override { return wire::ByteOrder::big; }
+  unsigned connection() const override { return connections_ + (is_tcp_ && broken_ ? 1U : 0U); }
 
   Bytes read_record(Record record, std::size_t size) override {
     std::uint16_t from = map::capability;
@@ -65,9 +68,10 @@ class ModbusClient final : public ControllerClient {
     std::array<std::uint16_t, map::most_read> registers{};
     for (std::size_t left = size / 2; left != 0;) {
       const std::size_t n = std::min<std::size_t>(left, map::most_read);
-      send(fmt::format("to read {} registers from 0x{:04X}", n, from), attempts_, [&] {
-        return modbus_read_registers(context_.get(), from, static_cast<int>(n), registers.data());
-      });
+      send(
+          fmt::format("to read {} registers from 0x{:04X}", n, from), attempts_,
+          [&] { return modbus_read_registers(context_.get(), from, static_cast<int>(n), registers.data()); },
+          true);
       append(out, {registers.data(), n});
       from = static_cast<std::uint16_t>(from + n);
       left -= n;
@@ -96,8 +100,9 @@ class ModbusClient final : public ControllerClient {
     std::array<std::uint16_t, 3> registers{};
     set_number(registers, argument);
     registers[2] = static_cast<std::uint16_t>(command);
-    // Sent once: a command whose answer got lost may have been executed.
-    send(fmt::format("to {}", describe(command)), 1, [&] {
+    // Sent once: a command whose answer got lost may have been executed. A set may be announced twice.
+    const int attempts = command == wire::Command::begin ? attempts_ : 1;
+    send(fmt::format("to {}", describe(command)), attempts, [&] {
       return modbus_write_registers(context_.get(), map::argument, static_cast<int>(registers.size()),
                                     registers.data());
     });
@@ -110,11 +115,14 @@ class ModbusClient final : public ControllerClient {
     while (out.size() < size) {
       const std::size_t n = std::min<std::size_t>((size - out.size() + 1) / 2, registers.size());
       set_number(offset, out.size());
-      send(fmt::format("for the bytes from {} of the active set", out.size()), attempts_, [&] {
-        return modbus_write_and_read_registers(context_.get(), map::reading_offset,
-                                               static_cast<int>(offset.size()), offset.data(),
-                                               map::reading_window, static_cast<int>(n), registers.data());
-      });
+      send(
+          fmt::format("for the bytes from {} of the active set", out.size()), attempts_,
+          [&] {
+            return modbus_write_and_read_registers(
+                context_.get(), map::reading_offset, static_cast<int>(offset.size()), offset.data(),
+                map::reading_window, static_cast<int>(n), registers.data());
+          },
+          true);
       append(out, {registers.data(), n});
       if (progress) progress(std::min(out.size(), size), size);
     }
@@ -166,7 +174,6 @@ class ModbusClient final : public ControllerClient {
     attempts_ = 1;
     set_timeout(options().response_timeout);
     modbus_set_slave(context_.get(), tcp.unit);
-    if (modbus_connect(context_.get()) != 0) fail_to_open(errno);
   }
 
   void open_rtu(const ModbusRtuAddress& rtu) {
@@ -182,17 +189,37 @@ class ModbusClient final : public ControllerClient {
     const auto line = milliseconds(2 * map::rtu_bytes * bits_per_byte * 1000 / rtu.baud + 1);
     set_timeout(options().response_timeout / attempts_ + line);
     modbus_set_slave(context_.get(), rtu.unit);
+    device_ = rtu.device;
+  }
+
+  void connect() {
     if (modbus_connect(context_.get()) != 0) fail_to_open(errno);
+    broken_ = false;
+    if (is_tcp_) return;
     // One master on a serial line (Modbus over Serial Line V1.02, 2.1). The kernel frees the lock when the
     // process ends.
     const auto end = steady_clock::now() + options().response_timeout;
     while (flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
       if (steady_clock::now() > end) {
         throw BusError(where(), fmt::format("another program on this machine has been using {} for {:.1f} s",
-                                            rtu.device, in_seconds(options().response_timeout)));
+                                            device_, in_seconds(options().response_timeout)));
       }
       std::this_thread::sleep_for(milliseconds(20));
     }
+  }
+
+  /// After an error a connection may be gone, or hold the rest of an answer.
+  void connect_anew() {
+    modbus_close(context_.get());
+    if (is_tcp_) ++connections_;
+    connect();
+  }
+
+  /// An answer that is late must not be taken for that to the next request.
+  void drop_late_answers() {
+    std::this_thread::sleep_for(std::clamp(timeout_ / 20, milliseconds(5), milliseconds(50)));
+    modbus_flush(context_.get());
+    late_ = false;
   }
 
   [[noreturn]] void fail_to_open(int error) const {
@@ -211,14 +238,20 @@ class ModbusClient final : public ControllerClient {
       {EMBXILVAL, {false, false, "Modbus exception 03, illegal value"}},
       {EMBXSFAIL, {false, false, "Modbus exception 04, server device failure"}}};
 
-  /// One request. Exceptions of the controller become BusRefusal, a time-out NoAnswer.
+  /// One request. Exceptions of the controller become BusRefusal, a time-out NoAnswer. One that only reads is asked once
+  /// more over a new connection where the old one breaks.
   template <class Request>
-  void send(const std::string& what, int attempts, const Request& request) {
+  void send(const std::string& what, int attempts, const Request& request, bool only_reads = false) {
+    if (broken_) connect_anew();
+    if (late_) drop_late_answers();
     int error = 0;
+    bool again = is_tcp_ && only_reads;
     for (int attempt = 0; attempt < attempts; ++attempt) {
-      // A late answer must not be taken for the answer to this request.
-      if (attempt != 0) modbus_flush(context_.get());
-      if (request() >= 0) return;
+      if (attempt != 0) drop_late_answers();
+      if (request() >= 0) {
+        late_ = attempt != 0;
+        return;
+      }
       error = errno;
       for (const auto& [exception, refusal] : refusals) {
         if (error == exception) throw refusal;
@@ -229,6 +262,14 @@ class ModbusClient final : public ControllerClient {
       }
       // A damaged or missing answer is worth another attempt, a broken connection is not.
       const bool damaged = error == ETIMEDOUT || (error >= EMBBADCRC && error < EMBBADCRC + 8);
+      broken_ = is_tcp_ || !damaged;
+      late_ = true;
+      if (again && error != ETIMEDOUT) {
+        again = false;
+        connect_anew();
+        --attempt;
+        continue;
+      }
       if (!damaged) break;
     }
     if (error == ETIMEDOUT) {
@@ -244,6 +285,11 @@ class ModbusClient final : public ControllerClient {
   int attempts_ = 1;
   int unit_ = 0;
   milliseconds timeout_{0};
+  bool is_tcp_ = false;
+  bool broken_ = false;  ///< the next request opens the connection anew
+  bool late_ = false;    ///< an answer to an earlier request may still come
+  unsigned connections_ = 0;
+  std::string device_;
 };
 
 }  // namespace

@@ -96,10 +96,21 @@ std::string abort_text(std::uint32_t code) {
 std::string ObjectAddress::text() const { return fmt::format("0x{:04X}:{}", index, sub); }
 
 SdoAbort::SdoAbort(ObjectAddress object, std::uint32_t code, bool by_server)
-    : std::runtime_error(fmt::format("{} at {}{}", abort_text(code), object.text(),
-                                     by_server ? "" : " (by this program: the answer did not fit)")),
+    : std::runtime_error(
+          fmt::format("{} at {}{}", abort_text(code), object.text(), by_server ? "" : " (by this program)")),
       code_(code),
       by_server_(by_server) {}
+
+std::string SdoDisturbances::text() const {
+  const auto some = [](unsigned count, const char* one, const char* many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+  };
+  std::vector<std::string> parts;
+  if (lost != 0) parts.push_back(some(lost, "request without an answer", "requests without an answer"));
+  if (doubled != 0) parts.push_back(some(doubled, "answer twice", "answers twice"));
+  if (foreign != 0) parts.push_back(some(foreign, "answer to another client", "answers to another client"));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
 
 SdoClient::SdoClient(int socket, std::uint8_t node, milliseconds timeout)
     : socket_(socket), node_(node), timeout_(timeout) {}
@@ -151,6 +162,14 @@ void SdoClient::drain() {
   }
 }
 
+void SdoClient::await_silence() {
+  const auto end = steady_clock::now() + timeout_ / 10;
+  const auto silence = std::clamp(timeout_ / 100, milliseconds(5), milliseconds(30));
+  Payload stale;
+  while (steady_clock::now() < end && receive(stale, steady_clock::now() + silence)) {
+  }
+}
+
 void SdoClient::abort(ObjectAddress object, std::uint32_t code) {
   Payload frame{};
   frame[0] = aborted;
@@ -160,60 +179,119 @@ void SdoClient::abort(ObjectAddress object, std::uint32_t code) {
   throw SdoAbort(object, code, false);
 }
 
-SdoClient::Payload SdoClient::exchange(const Payload& request, ObjectAddress object, bool first) {
-  const auto end = steady_clock::now() + timeout_;
+SdoClient::Fit SdoClient::fit(const Payload& answer, const Expected& expected) const {
+  const unsigned specifier = answer[0] & specifier_mask;
+  const bool names_object = specifier == upload_initiated || specifier == download_initiated;
+  const bool same_object =
+      load_u16(answer.data() + 1) == expected.object.index && answer[3] == expected.object.sub;
+  if (expected.first) {
+    if (names_object && !same_object) return Fit::foreign;
+    return specifier == expected.specifier ? Fit::yes : Fit::doubled;
+  }
+  if (names_object) {
+    // Our object: the answer to the start came twice; once the segments run, the server has begun anew. Another object
+    // in segments: the server has one transfer, which is now that one.
+    if (same_object) return expected.segment == 0 ? Fit::doubled : Fit::out_of_step;
+    return specifier == upload_initiated && (answer[0] & expedited) == 0 ? Fit::out_of_step : Fit::foreign;
+  }
+  if (specifier != expected.specifier) return Fit::foreign;
+  if ((answer[0] & toggle_bit) == expected.toggle) return Fit::yes;
+  // What is no copy of the last answer shows that an older one was taken for it.
+  const bool copy = expected.segment == 0 || answer == last_;
+  return copy ? Fit::doubled : Fit::out_of_step;
+}
+
+SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& expected, bool once) {
+  const ObjectAddress object = expected.object;
+  const auto end = steady_clock::now() + (once ? timeout_ / 4 : timeout_);
+  auto wait = std::max(timeout_ / 12, milliseconds(1));
+  auto again = once ? end : steady_clock::now() + wait;
   send(request, end);
   Payload answer;
   for (;;) {
-    if (!receive(answer, end)) {
+    if (!receive(answer, std::min(again, end))) {
+      if (steady_clock::now() < end) {
+        ++disturbances_.lost;
+        send(request, end);
+        wait *= 2;
+        again = steady_clock::now() + wait;
+        continue;
+      }
       try {
         abort(object, co::abort::timeout);
       } catch (const SdoAbort&) {
         throw SdoTimeout(fmt::format("no answer about {}", object.text()));
       }
     }
-    const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
     if (answer[0] == aborted) {
-      // A late abort of an earlier transfer names another object.
-      if (!same_object) continue;
-      throw SdoAbort(object, load_u32(answer.data() + 4), true);
+      const std::uint32_t code = load_u32(answer.data() + 4);
+      const bool of_segments = code == co::abort::toggle || code == co::abort::timeout;
+      const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
+      // A segment is answered by an abort about another object where that one has replaced the transfer. The start of
+      // a transfer is answered by none of the codes of segments: those are of an earlier one.
+      const bool ours = expected.first ? same_object && !of_segments
+                                       : same_object || of_segments || code == co::abort::command;
+      if (ours) throw SdoAbort(object, code, true);
+      ++(same_object ? disturbances_.doubled : disturbances_.foreign);
+      continue;
     }
-    if (first && !same_object) continue;
-    return answer;
+    switch (fit(answer, expected)) {
+      case Fit::yes:
+        last_ = answer;
+        return answer;
+      case Fit::doubled:
+        ++disturbances_.doubled;
+        break;
+      case Fit::foreign:
+        ++disturbances_.foreign;
+        break;
+      case Fit::out_of_step:
+        ++disturbances_.foreign;
+        abort(object, co::abort::toggle);
+    }
   }
+}
+
+SdoClient::Payload SdoClient::expedited_frame(ObjectAddress object,
+                                              std::span<const std::uint8_t> data) const {
+  Payload frame{};
+  address(frame, object);
+  const auto unused = static_cast<unsigned>(in_expedited - data.size());
+  frame[0] = static_cast<std::uint8_t>(download_initiate | (unused << 2U) | expedited | size_indicated);
+  std::copy(data.begin(), data.end(), frame.begin() + 4);
+  return frame;
+}
+
+void SdoClient::download_once(ObjectAddress object, std::span<const std::uint8_t> data) {
+  drain();
+  exchange(expedited_frame(object, data), {object, download_initiated}, true);
 }
 
 void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress) {
   drain();
+  if (!data.empty() && data.size() <= in_expedited) {
+    exchange(expedited_frame(object, data), {object, download_initiated});
+    return;
+  }
   Payload frame{};
   address(frame, object);
-  const bool is_expedited = !data.empty() && data.size() <= in_expedited;
-  if (is_expedited) {
-    const auto unused = static_cast<unsigned>(in_expedited - data.size());
-    frame[0] = static_cast<std::uint8_t>(download_initiate | (unused << 2U) | expedited | size_indicated);
-    std::copy(data.begin(), data.end(), frame.begin() + 4);
-  } else {
-    frame[0] = download_initiate | size_indicated;
-    store_u32(frame.data() + 4, static_cast<std::uint32_t>(data.size()));
-  }
-  const Payload initiated = exchange(frame, object, true);
-  if ((initiated[0] & specifier_mask) != download_initiated) abort(object, co::abort::command);
-  if (is_expedited) return;
+  frame[0] = download_initiate | size_indicated;
+  store_u32(frame.data() + 4, static_cast<std::uint32_t>(data.size()));
+  exchange(frame, {object, download_initiated});
 
-  unsigned toggle = 0;
+  Expected expected{object, download_segment_taken, false};
   std::size_t at = 0;
   do {
     const std::size_t size = std::min(in_segment, data.size() - at);
     const bool last = at + size == data.size();
     frame = {};
-    frame[0] = static_cast<std::uint8_t>(download_segment | toggle |
+    frame[0] = static_cast<std::uint8_t>(download_segment | expected.toggle |
                                          static_cast<unsigned>((in_segment - size) << 1U) |
                                          (last ? last_segment : 0U));
     std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), size, frame.begin() + 1);
-    const Payload answer = exchange(frame, object, false);
-    if ((answer[0] & specifier_mask) != download_segment_taken) abort(object, co::abort::command);
-    if ((answer[0] & toggle_bit) != toggle) abort(object, co::abort::toggle);
-    toggle ^= toggle_bit;
+    exchange(frame, expected);
+    expected.toggle ^= toggle_bit;
+    ++expected.segment;
     at += size;
     if (progress) progress(at, data.size());
   } while (at != data.size());
@@ -224,8 +302,7 @@ std::vector<std::uint8_t> SdoClient::upload(ObjectAddress object, const Progress
   Payload frame{};
   frame[0] = upload_initiate;
   address(frame, object);
-  const Payload initiated = exchange(frame, object, true);
-  if ((initiated[0] & specifier_mask) != upload_initiated) abort(object, co::abort::command);
+  const Payload initiated = exchange(frame, {object, upload_initiated});
   const bool sized = (initiated[0] & size_indicated) != 0;
   if ((initiated[0] & expedited) != 0) {
     const std::size_t unused = sized ? (initiated[0] >> 2U) & 3U : 0U;
@@ -238,17 +315,16 @@ std::vector<std::uint8_t> SdoClient::upload_segments(ObjectAddress object, std::
                                                      bool is_announced, const Progress& progress) {
   std::vector<std::uint8_t> out;
   const std::size_t most = is_announced ? std::min(announced, longest) : longest;
-  unsigned toggle = 0;
+  Expected expected{object, upload_segment_given, false};
   for (bool last = false; !last;) {
     Payload frame{};
-    frame[0] = static_cast<std::uint8_t>(upload_segment | toggle);
-    const Payload answer = exchange(frame, object, false);
-    if ((answer[0] & specifier_mask) != upload_segment_given) abort(object, co::abort::command);
-    if ((answer[0] & toggle_bit) != toggle) abort(object, co::abort::toggle);
+    frame[0] = static_cast<std::uint8_t>(upload_segment | expected.toggle);
+    const Payload answer = exchange(frame, expected);
     const std::size_t size = in_segment - ((answer[0] >> 1U) & 7U);
     out.insert(out.end(), answer.begin() + 1, answer.begin() + 1 + static_cast<std::ptrdiff_t>(size));
     last = (answer[0] & last_segment) != 0;
-    toggle ^= toggle_bit;
+    expected.toggle ^= toggle_bit;
+    ++expected.segment;
     if (out.size() > most) abort(object, co::abort::too_long);
     if (progress) progress(out.size(), is_announced ? announced : out.size());
   }

@@ -39,25 +39,62 @@ class SdoTimeout : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What else was on the channel than the answers that were waited for.
+struct SdoDisturbances {
+  unsigned lost = 0;     ///< requests that were sent again, because no answer came
+  unsigned doubled = 0;  ///< answers that had come before
+  unsigned foreign = 0;  ///< answers to another client, about other objects
+
+  bool any() const { return lost != 0 || doubled != 0 || foreign != 0; }
+  std::string text()
+      const;  ///< 2 requests sent again without an answer, 1 answer twice, 31 answers to another client
+};
+
+/// One client of one channel. An answer is taken only where it fits the request: by the object at the start of a transfer, by
+/// command specifier and toggle bit in its segments. All others are counted and passed over. A request without an answer is
+/// sent again: servers that know the segment for the one that they had last repeat their answer, others abort the
+/// transfer, which may then be begun anew.
 class SdoClient {
  public:
   using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
   /// \param socket   one struct can_frame per read and write; owned by the caller
-  /// \param timeout  limit of each answer of the server
+  /// \param timeout  limit of each answer of the server; requests are sent again after a twelfth of it, then after
+  ///                 twice as long, and so on
   SdoClient(int socket, std::uint8_t node, std::chrono::milliseconds timeout);
 
   /// Reads an object: expedited or segmented upload (CiA 301, 7.2.4.3). \throws SdoAbort, SdoTimeout, std::system_error
   std::vector<std::uint8_t> upload(ObjectAddress object, const Progress& progress = {});
   /// Writes an object: expedited up to 4 bytes, else segmented download (CiA 301, 7.2.4.3). Throws as upload().
   void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {});
+  /// The same for at most 4 bytes, sent once and waited for a quarter of the time limit: for what must not be done twice.
+  void download_once(ObjectAddress object, std::span<const std::uint8_t> data);
+
+  /// Takes in what still comes until nothing has come for a moment, at most a tenth of the time limit: after a transfer
+  /// that was broken off its late answers must not be taken for those of the next one.
+  void await_silence();
+
+  /// Since the client was made.
+  const SdoDisturbances& disturbances() const { return disturbances_; }
 
  private:
   using Payload = std::array<std::uint8_t, 8>;
 
+  /// The answer that a request must have.
+  struct Expected {
+    ObjectAddress object;
+    unsigned specifier = 0;
+    bool first = true;    ///< of the transfer: the answer names the object
+    unsigned toggle = 0;  ///< of a segment
+    unsigned segment = 0;
+  };
+  enum class Fit { yes, doubled, foreign, out_of_step };
+
   std::vector<std::uint8_t> upload_segments(ObjectAddress object, std::size_t announced, bool is_announced,
                                             const Progress& progress);
-  Payload exchange(const Payload& request, ObjectAddress object, bool first);
+  Payload expedited_frame(ObjectAddress object, std::span<const std::uint8_t> data) const;
+  Payload exchange(const Payload& request, const Expected& expected, bool once = false);
+  Fit fit(const Payload& answer, const Expected& expected) const;
   void send(const Payload& payload, std::chrono::steady_clock::time_point end);
   bool receive(Payload& payload, std::chrono::steady_clock::time_point end);
   void drain();
@@ -66,6 +103,8 @@ class SdoClient {
   int socket_;
   std::uint8_t node_;
   std::chrono::milliseconds timeout_;
+  Payload last_{};  ///< the last answer that was taken
+  SdoDisturbances disturbances_;
 };
 
 }  // namespace flexcomp::host

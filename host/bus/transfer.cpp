@@ -13,6 +13,7 @@
 
 #include "files/robot_file.hpp"
 #include "files/yaml_field.hpp"
+#include "flexcomp/bytes.hpp"
 #include "flexcomp/image.hpp"
 #include "input_error.hpp"
 #include "model/parameter_image.hpp"
@@ -90,15 +91,52 @@ void refuse_beyond_capability(const ControllerClient& client, const std::string&
                                              source, fmt::join(beyond, "; ")));
 }
 
-void push_image(ControllerClient& client, std::span<const std::uint8_t> image, const PushOptions& options) {
+SetIdentity identity(std::span<const std::uint8_t> image) {
+  // include/flexcomp/image.hpp
+  constexpr std::size_t sequence_at = 12;
+  SetIdentity out;
+  out.bytes = static_cast<std::uint32_t>(image.size());
+  if (image.size() >= sequence_at + 4) {
+    out.sequence = load_u32(image.data() + sequence_at);
+    out.crc = load_u32(image.data() + image.size() - 4);
+  }
+  return out;
+}
+
+bool SetIdentity::is_active(const wire::Status& status) const {
+  return status.active_slot != wire::no_slot && status.active_sequence == sequence &&
+         status.active_crc == crc && status.active_bytes == bytes;
+}
+
+std::optional<wire::Status> read_back(ControllerClient& client, std::span<const std::uint8_t> image,
+                                      const Progress& progress) {
+  const SetIdentity wanted = identity(image);
+  std::string trouble = "its active set was to be read back";
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const wire::Status before = client.settled_status(trouble);
+    if (!wanted.is_active(before)) return std::nullopt;
+    try {
+      const Bytes back = client.active_image(progress);
+      const auto [there, sent] = std::mismatch(back.begin(), back.end(), image.begin(), image.end());
+      if (there == back.end() && sent == image.end()) return before;
+      trouble = back.size() != image.size()
+                    ? fmt::format("the active set has {} bytes, {} were sent", back.size(), image.size())
+                    : fmt::format("byte {} of the active set is 0x{:02X}, 0x{:02X} was sent",
+                                  there - back.begin(), *there, *sent);
+    } catch (const BusError& e) {
+      trouble = e.text();
+    }
+  }
+  throw OutcomeOpen(client.where(),
+                    fmt::format("set {} is active by its number, CRC and length, but was not read back: {}",
+                                wanted.sequence, trouble));
+}
+
+wire::Status push_image(ControllerClient& client, std::span<const std::uint8_t> image,
+                        const PushOptions& options) {
   try {
     client.stage(image, options.progress);
     client.run(wire::Command::verify);
-    if (options.trial_cycles) {
-      client.run(wire::Command::commit_trial, *options.trial_cycles);
-    } else {
-      client.run(wire::Command::commit);
-    }
   } catch (const RefusedByController& e) {
     // In a busy controller the staging area belongs to another client.
     if (e.answer() != wire::Answer::busy) {
@@ -110,17 +148,37 @@ void push_image(ControllerClient& client, std::span<const std::uint8_t> image, c
     }
     throw;
   }
-  const Bytes back = client.active_image(options.progress);
-  if (back.size() != image.size()) {
-    throw BusError(client.where(), fmt::format("the active set has {} bytes after the commit, {} were sent",
-                                               back.size(), image.size()));
-  }
-  const auto [there, sent] = std::mismatch(back.begin(), back.end(), image.begin());
-  if (there != back.end()) {
-    throw BusError(client.where(),
-                   fmt::format("byte {} of the active set is 0x{:02X} after the commit, 0x{:02X} was sent",
-                               there - back.begin(), *there, *sent));
-  }
+  const SetIdentity wanted = identity(image);
+  client.conclude(options.trial_cycles ? wire::Command::commit_trial : wire::Command::commit,
+                  options.trial_cycles.value_or(0),
+                  [&wanted](const wire::Status& now) { return wanted.is_active(now); });
+  if (const auto active = read_back(client, image, options.progress)) return *active;
+  const wire::Status now = client.settled_status("its active set was to be read back");
+  throw RefusedByController(
+      client.where(),
+      fmt::format("set {} was active, but is no longer: {}", wanted.sequence,
+                  now.answer == static_cast<std::uint16_t>(wire::Answer::reverted)
+                      ? text(wire::Answer::reverted)
+                  : now.active_slot == wire::no_slot ? "no set is active now"
+                                                     : fmt::format("set {} is", now.active_sequence)),
+      static_cast<wire::Answer>(now.answer), static_cast<Refusal>(now.refusal));
+}
+
+wire::Status confirm_trial(ControllerClient& client) {
+  const wire::Status before = client.status();
+  return client.conclude(wire::Command::confirm, 0, [&before](const wire::Status& now) {
+    constexpr auto trial = static_cast<std::uint16_t>(wire::StoreState::trial);
+    return before.state == trial && now.state != trial && now.active_slot == before.active_slot &&
+           now.active_sequence == before.active_sequence && now.active_crc == before.active_crc;
+  });
+}
+
+wire::Status roll_back(ControllerClient& client) {
+  const wire::Status before = client.status();
+  return client.conclude(wire::Command::rollback, 0, [&before](const wire::Status& now) {
+    return now.active_slot != before.active_slot || now.active_sequence != before.active_sequence ||
+           now.active_crc != before.active_crc;
+  });
 }
 
 Robot robot_of(ControllerClient& client, const std::string& robot_path) {

@@ -29,10 +29,35 @@ struct PushOptions {
   Progress progress;
 };
 
-/// Stages, verifies and commits an image, reads it back and compares all bytes. A refusal or failure before the commit
-/// leaves the controller's sets unchanged. \throws BusError
-void push_image(ControllerClient& client, std::span<const std::uint8_t> image,
-                const PushOptions& options = {});
+/// A parameter image as a controller's status tells it.
+struct SetIdentity {
+  std::uint32_t sequence = 0;
+  std::uint32_t crc = 0;
+  std::uint32_t bytes = 0;
+
+  bool is_active(const wire::Status& status) const;
+};
+
+/// Reads sequence number and CRC from an image, whatever else is wrong with it.
+SetIdentity identity(std::span<const std::uint8_t> image);
+
+/// Stages, verifies and commits an image, reads it back and compares all bytes. Returns the status in which it is active.
+/// \throws BusError  it is not active and does not become so: the controller's sets are as they were
+/// \throws OutcomeOpen  after the commit, where this cannot be told now
+wire::Status push_image(ControllerClient& client, std::span<const std::uint8_t> image,
+                        const PushOptions& options = {});
+
+/// Whether the active set is this image, by its identity in the status and by all bytes read back. Returns the status in which
+/// it is; nothing where another set, or none, is active. Waits for a store that is working. \throws OutcomeOpen where this
+/// cannot be told now
+std::optional<wire::Status> read_back(ControllerClient& client, std::span<const std::uint8_t> image,
+                                      const Progress& progress = {});
+
+/// Makes the set on trial permanent; returns the status in which it is. Throws as push_image().
+wire::Status confirm_trial(ControllerClient& client);
+
+/// Returns to the set before; returns the status then. Throws as push_image().
+wire::Status roll_back(ControllerClient& client);
 
 /// Nominal robot of a controller: from `robot_path`, verified by the controller's hashes, or from its robot record.
 /// \throws BusError  another robot or geometry; no path given and no robot record

@@ -61,7 +61,7 @@ int run(int argc, char** argv) {
       "controller.\n"
       "Exit status: 0 done; 1 a fault of the machine or of this program (a file that cannot be written); 2 "
       "usage; 3 input refused; 4 the bus or the device refused or did not answer; 5 done, but the "
-      "result is not trustworthy.",
+      "result is not trustworthy, or what a controller made of a command cannot be told now.",
       "flexcomp"};
   app.set_version_flag("--version", "flexcomp " FLEXCOMP_VERSION);
   app.require_subcommand(1);

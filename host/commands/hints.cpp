@@ -195,6 +195,14 @@ CLI::ValidationError usage_error(const ArgumentError& e) {
 std::string hint(const std::exception& error, const std::string& command) {
   if (const auto* input = dynamic_cast<const InputError*>(&error)) return of_input(*input, command);
   if (const auto* bus = dynamic_cast<const BusError*>(&error)) return of_bus(*bus);
+  if (const auto* open = dynamic_cast<const OutcomeOpen*>(&error)) {
+    const std::string& where = open->address();
+    return fmt::format("\"flexcomp status --of {}\" says which set runs{}", where,
+                       command == "push" ? fmt::format("; \"flexcomp push --to {} --resume\" with the same "
+                                                       "file settles it",
+                                                       where)
+                                         : "");
+  }
   const auto* doubtful = dynamic_cast<const DoubtfulResult*>(&error);
   if (doubtful != nullptr && doubtful->code() == ErrorCode::poor_fit)
     return "\"flexcomp diagnose\" with the same robot and data looks for the effect that the model lacks";

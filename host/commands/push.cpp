@@ -15,7 +15,6 @@
 #include "files/calibration_file.hpp"
 #include "files/robot_file.hpp"
 #include "files/write_file.hpp"
-#include "flexcomp/bytes.hpp"
 #include "json.hpp"
 #include "model/parameter_image.hpp"
 
@@ -31,6 +30,11 @@ void Push::check_options() const {
   if (!against.empty() && to->count() != 0)
     throw CLI::ValidationError("--against", "compares with a file: no --to with it");
   if (to->count() == 0 && against.empty()) throw CLI::RequiredError("--to");
+  if (resume && (confirm || dry_run))
+    throw CLI::ValidationError("--resume", "settles a push: no --confirm or --dry-run with it");
+  if (resume && sequence)
+    throw CLI::ValidationError("--resume",
+                               "compares with the active set by its number: no --sequence with it");
   if (dry_run && (confirm || trial_s || !image.empty()))
     throw CLI::ValidationError("--dry-run",
                                "sends and writes nothing: no --trial, --confirm or --image with it");
@@ -41,72 +45,100 @@ void Push::say_left_out(const std::vector<std::string>& names) const {
   bus.say(fmt::format("{}: left out, for they belong to the measurement: {}", set, fmt::join(names, ", ")));
 }
 
-Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out) const {
+Bytes Push::make(ControllerClient& client, std::vector<std::string>& left_out,
+                 std::optional<std::uint32_t> number) const {
   const Robot for_robot = robot_of(client, robot);
   const Calibration calibration = load_calibration_for(client, set, for_robot);
   left_out = never_pushed(calibration, for_robot);
   ImageOptions options;
   options.allow_unnamed = allow_unnamed;
-  Bytes out = make_image(calibration, for_robot, sequence ? *sequence : next_sequence(client), options);
+  Bytes out = make_image(calibration, for_robot, number ? *number : next_sequence(client), options);
   refuse_beyond_capability(client, set, out);
   return out;
 }
 
-void Push::run() const {
-  const auto start = std::chrono::steady_clock::now();
-  check_options();
-  if (dry_run) {
-    show_changes();
-    return;
-  }
-  // A file that cannot be read is said before anybody is asked.
-  const std::optional<Bytes> ready = confirm ? std::nullopt : read_image_file(set);
-  const std::unique_ptr<ControllerClient> client = bus.connect();
-  Json result{{"bus", client->where()}};
-  if (confirm) {
-    client->run(wire::Command::confirm);
-    const std::uint32_t active = client->status().active_sequence;
-    result["sequence"] = active;
-    bus.say(fmt::format("{}: set {} is confirmed", client->where(), active));
-    bus.write_json(result);
-    return;
-  }
+void Push::say_active(OutcomeTask& task, const wire::Status& now, std::size_t bytes, bool sent,
+                      double seconds) const {
+  const std::string& where = task.client->where();
+  const bool on_trial = now.state == static_cast<std::uint16_t>(wire::StoreState::trial);
+  task.result["sequence"] = now.active_sequence;
+  task.result["bytes"] = bytes;
+  task.result["crc"] = fmt::format("{:08x}", now.active_crc);
+  task.result["trial"] = on_trial;
+  task.result["sent"] = sent;
+  task.result["seconds"] = seconds;
+  const double left_s = now.trial_cycles_left * 1e-6 * task.client->capability().cycle_us;
+  bus.say(fmt::format("{}: set {} is active{}: {} bytes, read back and equal{}, {:.2f} s", where,
+                      now.active_sequence,
+                      on_trial ? fmt::format(" on trial (confirm within {:.1f} s: push --to {} --confirm)",
+                                             sent ? *trial_s : left_s, where)
+                               : "",
+                      bytes, sent ? "" : ", nothing was sent", seconds));
+}
 
+void Push::send(OutcomeTask& task, const std::optional<Bytes>& ready) const {
+  const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [start] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  task.client = bus.connect();
+  ControllerClient& client = *task.client;
   std::vector<std::string> left_out;
-  const Bytes bytes = ready ? *ready : make(*client, left_out);
+  if (resume) {
+    // What an earlier push became, without knowing of it: the file is the same set where it makes the same bytes.
+    const wire::Status before = client.settled_status("an earlier push may be at work");
+    if (before.active_slot != wire::no_slot) {
+      const Bytes bytes = ready ? *ready : make(client, left_out, before.active_sequence);
+      if (const auto now = read_back(client, bytes)) {
+        say_active(task, *now, bytes.size(), false, seconds());
+        return;
+      }
+    }
+    task.undecided = false;
+  }
+  const Bytes bytes = ready ? *ready : make(client, left_out, sequence);
   say_left_out(left_out);
+  task.result["left_out"] = left_out;
   if (!image.empty()) {
     write_file(image, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
   PushOptions options;
   if (trial_s) {
     const double cycles =
-        std::ceil(*trial_s * 1e6 / std::max<std::uint32_t>(client->capability().cycle_us, 1));
+        std::ceil(*trial_s * 1e6 / std::max<std::uint32_t>(client.capability().cycle_us, 1));
     if (cycles > std::numeric_limits<std::uint32_t>::max()) {
       throw CLI::ValidationError("--trial", "so long a trial cannot be counted");
     }
     options.trial_cycles = static_cast<std::uint32_t>(cycles);
   }
+  wire::Status now;
   {
     ProgressBar bar("pushing", bus.quiet);
     options.progress = bar.callback();
-    push_image(*client, bytes, options);
+    now = push_image(client, bytes, options);
   }
-  const wire::Status now = client->status();
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  result["sequence"] = now.active_sequence;
-  result["bytes"] = bytes.size();
-  result["crc"] = fmt::format("{:08x}", now.active_crc);
-  result["left_out"] = left_out;
-  result["trial"] = trial_s.has_value();
-  result["seconds"] = took.count();
-  bus.say(fmt::format("{}: set {} is active{}: {} bytes, read back and equal, {:.2f} s", client->where(),
-                      now.active_sequence,
-                      trial_s ? fmt::format(" on trial (confirm within {:.1f} s: push --to {} --confirm)",
-                                            *trial_s, client->where())
-                              : "",
-                      bytes.size(), took.count()));
-  bus.write_json(result);
+  say_active(task, now, bytes.size(), true, seconds());
+}
+
+void Push::run() const {
+  check_options();
+  if (dry_run) {
+    show_changes();
+    return;
+  }
+  if (confirm) {
+    run_to_outcome(bus, [this](OutcomeTask& task) {
+      task.client = bus.connect();
+      const std::uint32_t active = confirm_trial(*task.client).active_sequence;
+      task.result["sequence"] = active;
+      bus.say(fmt::format("{}: set {} is confirmed", task.client->where(), active));
+    });
+    return;
+  }
+  // A file that cannot be read is said before anybody is asked.
+  const std::optional<Bytes> ready = read_image_file(set);
+  run_to_outcome(
+      bus, [&](OutcomeTask& task) { send(task, ready); }, resume);
 }
 
 void add_push(CLI::App& app) {
@@ -125,6 +157,10 @@ void add_push(CLI::App& app) {
                   "On trial: the set before comes back unless confirmed within this time [s]")
       ->check(positive_number());
   command.add_flag("--confirm", state.confirm, "Keep the set that runs on trial; no CAL.yaml then");
+  command.add_flag(
+      "--resume", state.resume,
+      "Settle a push that ended open, or was cut off: nothing is sent where CAL.yaml is already active, "
+      "byte for byte; else it is pushed again");
   command.add_flag("--allow-unnamed", state.allow_unnamed, "Also push what was found but not understood");
   command.add_flag(
       "--dry-run", state.dry_run,
@@ -132,9 +168,15 @@ void add_push(CLI::App& app) {
   add_value(command, "--against", state.against, "CAL.yaml",
             "With --dry-run: compare with this file (of pull) instead of a controller");
   command.footer(
+      "A push ends in one of three words (JSON \"outcome\"): active, read back and equal, exit status 0; "
+      "refused, the "
+      "set before runs, 4; open, it cannot be told now what the controller made of the commit, 5: \"flexcomp "
+      "status\" or "
+      "--resume settles it.\n"
       "Examples:\n"
       "  flexcomp push --to can:vcan0:5 --dry-run cal.yaml\n"
       "  flexcomp push --to can:vcan0:5 cal.yaml\n"
+      "  flexcomp push --to can:vcan0:5 --resume cal.yaml\n"
       "  flexcomp push --dry-run --against active.yaml --robot tx60l.yaml cal.yaml");
 }
 

@@ -10,6 +10,7 @@
 
 #include "bus/controller_client.hpp"
 #include "commands/bus_options.hpp"
+#include "commands/outcome.hpp"
 
 namespace flexcomp::host {
 
@@ -23,11 +24,16 @@ struct Push {
   bool confirm = false;
   bool allow_unnamed = false;
   bool dry_run = false;
+  bool resume = false;
   std::string against;
   const CLI::Option* to = nullptr;
 
   void run() const;
-  Bytes make(ControllerClient& client, std::vector<std::string>& left_out) const;
+  void send(OutcomeTask& task, const std::optional<Bytes>& ready) const;
+  void say_active(OutcomeTask& task, const wire::Status& now, std::size_t bytes, bool sent,
+                  double seconds) const;
+  Bytes make(ControllerClient& client, std::vector<std::string>& left_out,
+             std::optional<std::uint32_t> number) const;
   void show_changes() const;
   void check_options() const;
   void say_left_out(const std::vector<std::string>& names) const;

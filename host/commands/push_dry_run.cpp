@@ -42,7 +42,7 @@ void Push::show_changes() const {
     const std::optional<Bytes> ready = read_image_file(set);
     const std::unique_ptr<ControllerClient> client = bus.connect();
     for_robot = robot_of(*client, robot);
-    const Bytes bytes = ready ? *ready : make(*client, left_out);
+    const Bytes bytes = ready ? *ready : make(*client, left_out, sequence);
     // A file that is no image is the file's fault; what a sound one asks for may be beyond the controller.
     next = calibration_from_image(bytes, for_robot, set).terms;
     refuse_beyond_capability(*client, set, bytes);

@@ -343,6 +343,95 @@ TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
   EXPECT_EQ(command(Command::verify), 0U);
 }
 
+TEST_F(Canopen, APollOfASmallObjectLeavesTheTransferAlone) {
+  const Bytes image = make_image(arm.robot, 5);
+  const auto poll_error_register = [this] {
+    EXPECT_EQ(code(ask(head(0x40, 0x1001, 0))), 0U);
+    EXPECT_EQ(code(ask(head(0x40, co::status_summary, 5))), 0U);
+  };
+  // Between all segments of a download.
+  EXPECT_EQ(ask(head(0x21, co::image, 1, static_cast<std::uint32_t>(image.size()))),
+            head(0x60, co::image, 1));
+  unsigned toggle = 0;
+  for (std::size_t at = 0; at < image.size(); at += 7) {
+    EXPECT_EQ(ask(head(0x40, 0x1001, 0)), head(0x4F, 0x1001, 0, 1)) << "no set yet";
+    const std::size_t n = std::min<std::size_t>(7, image.size() - at);
+    Frame f{};
+    f[0] = static_cast<std::uint8_t>(toggle | ((7 - n) << 1U) | (at + n == image.size() ? 1U : 0U));
+    std::copy_n(image.begin() + static_cast<std::ptrdiff_t>(at), n, f.begin() + 1);
+    ASSERT_EQ(ask(f), (Frame{static_cast<std::uint8_t>(0x20U | toggle)})) << at;
+    toggle ^= 0x10U;
+  }
+  EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), 0U);
+  for (int k = 0; k < 100; ++k) poll(1);
+  ASSERT_EQ(status().active_sequence, 5U);
+  // Between those of an upload, of the image and of a record, which lies in the node's own memory.
+  for (const std::uint16_t index : {co::image, co::robot}) {
+    const std::uint8_t sub = index == co::image ? 2 : 0;
+    const Bytes expected = upload(index, sub);
+    const auto r = ask(head(0x40, index, sub));
+    ASSERT_EQ(code(r), 0U);
+    Bytes got;
+    for (unsigned t = 0; got.size() < expected.size(); t ^= 0x10U) {
+      poll_error_register();
+      const auto s = ask(Frame{static_cast<std::uint8_t>(0x60U | t)});
+      ASSERT_EQ(code(s), 0U);
+      got.insert(got.end(), s->begin() + 1, s->begin() + 8 - (((*s)[0] >> 1U) & 7U));
+    }
+    EXPECT_EQ(got, expected);
+  }
+  // A larger object, or a command, ends the transfer as before; polls do not keep alive what its client has left.
+  ask(head(0x21, co::image, 1, 100));
+  ask(head(0x40, 0x1008, 0));
+  EXPECT_EQ(arm.device->status().state, 0);
+  ask(head(0x21, co::image, 1, 100));
+  for (int k = 0; k < 25; ++k) {
+    poll(100);
+    poll_error_register();
+  }
+  EXPECT_EQ(arm.device->status().state, 0);
+}
+
+TEST_F(Canopen, ARepeatedSegmentIsAnsweredAgain) {
+  const Bytes image = make_image(arm.robot, 5);
+  ask(head(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
+  unsigned toggle = 0;
+  for (std::size_t at = 0; at < image.size(); at += 7) {
+    const std::size_t n = std::min<std::size_t>(7, image.size() - at);
+    Frame f{};
+    f[0] = static_cast<std::uint8_t>(toggle | ((7 - n) << 1U) | (at + n == image.size() ? 1U : 0U));
+    std::copy_n(image.begin() + static_cast<std::ptrdiff_t>(at), n, f.begin() + 1);
+    for (int times = 0; times < 3; ++times) {
+      ASSERT_EQ(ask(f), (Frame{static_cast<std::uint8_t>(0x20U | toggle)})) << at;
+    }
+    toggle ^= 0x10U;
+  }
+  EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), 0U);
+  for (int k = 0; k < 100; ++k) poll(1);
+  Bytes got;
+  ask(head(0x40, co::image, 2));
+  for (unsigned t = 0; got.size() < image.size(); t ^= 0x10U) {
+    const Frame request{static_cast<std::uint8_t>(0x60U | t)};
+    const auto s = ask(request);
+    ASSERT_EQ(code(s), 0U);
+    EXPECT_EQ(ask(request), s);
+    EXPECT_EQ(ask(request), s);
+    got.insert(got.end(), s->begin() + 1, s->begin() + 8 - (((*s)[0] >> 1U) & 7U));
+  }
+  EXPECT_EQ(got, image);
+  // Another segment with this toggle bit is none of these.
+  ask(head(0x21, co::image, 1, 100));
+  EXPECT_EQ(code(ask(Frame{0x00, 1})), 0U);
+  EXPECT_EQ(code(ask(Frame{0x00, 2})), co::abort::toggle);
+  EXPECT_EQ(code(ask(Frame{0x00, 1})), co::abort::command) << "the transfer is over";
+  // Nor is one that comes long after.
+  upload(co::status, 0);
+  poll(1);
+  poll(2000);
+  EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
+  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::command);
+}
+
 TEST_F(Canopen, TellsTheCertificateOfTheActiveSet) {
   ASSERT_EQ(arm.push(make_image(arm.robot, 4)), wire::Answer::accepted);
   const Bytes bytes = upload(co::certificate, 0);

@@ -396,12 +396,31 @@ def trial(bench):
         check(time.monotonic() < end, "a trial ends")
     now = bench.status("modbus-tcp")
     check(set_of(now) == set_of(before) and "trial_reverted" in now["faults"], "a trial reverts by itself", now)
-    flexcomp("push", "--to", at, f"{bench.work}/cal2.yaml", "--trial", "100")
-    flexcomp("push", "--to", at, "--confirm")
+    told = f"{bench.work}/told.json"
+    flexcomp("push", "--to", at, f"{bench.work}/cal2.yaml", "--trial", "100", "--json", told)
+    first = json.loads(read(told, "r"))
+    check(first["outcome"] == "active" and first["trial"] and first["sent"], "the word and the trial in JSON", first)
+    found = flexcomp("push", "--to", at, "--resume", f"{bench.work}/cal2.yaml", "--json", told)
+    check("is active on trial (confirm within" in found.out and "nothing was sent" in found.out, "--resume finds the set",
+          found)
+    again = json.loads(read(told, "r"))
+    check(again["outcome"] == "active" and again["trial"] and not again["sent"] and again["crc"] == first["crc"],
+          "and sends nothing", again)
+    refused = flexcomp("push", "--to", at, "--resume", f"{bench.work}/cal.yaml", "--json", told, expect=4)
+    check(": refused: " in refused.err and json.loads(read(told, "r"))["outcome"] == "refused",
+          "another set on trial is in the way", refused)
+    flexcomp("push", "--to", at, "--confirm", "--json", told)
+    check(json.loads(read(told, "r"))["outcome"] == "active", "confirmed: the word in JSON")
+    refused = flexcomp("push", "--to", at, "--confirm", "--json", told, expect=4)
+    check(json.loads(read(told, "r"))["outcome"] == "refused" and "; set " in refused.err, "nothing to confirm", refused)
     now = bench.status("modbus-tcp")
     check(now["state"] == "idle" and now["active"]["sequence"] == before["active"]["sequence"] + 1, "confirmed", now)
+    flexcomp("rollback", "--at", at, "--json", told)
+    check(json.loads(read(told, "r"))["outcome"] == "active", "rolled back: the word in JSON")
+    flexcomp("push", "--to", at, "--resume", f"{bench.work}/cal2.yaml", "--json", told)
+    check(json.loads(read(told, "r"))["sent"], "--resume pushes what is not active")
     flexcomp("rollback", "--at", at)
-    passed("a set on trial reverts by itself, and stays when confirmed")
+    passed("a set on trial reverts by itself, stays when confirmed; --resume finds what is active and sends what is not")
 
 
 def silence(bench):
@@ -420,6 +439,11 @@ def silence(bench):
     for bus in bench.buses:
         result = flexcomp("push", "--to", bench.address[bus], f"{bench.work}/cal.yaml", "--timeout", "0.9", expect=4)
         check("did not answer" in result.err and result.seconds < 0.9 + SLACK, "a stopped controller is given up", result)
+        check(": refused: " in result.err, "nothing was sent", result)
+        result = flexcomp("push", "--to", bench.address[bus], "--resume", f"{bench.work}/cal.yaml", "--timeout", "0.9",
+                          "--json", f"{bench.work}/told.json", expect=5)
+        check(": open: " in result.err and "hint: \"flexcomp status --of" in result.err, "an earlier push stays open", result)
+        check(json.loads(read(f"{bench.work}/told.json", "r"))["outcome"] == "open", "the word in JSON")
     bench.controller.send_signal(signal.SIGCONT)
     passed("a controller that hangs: exit 4 on every bus")
     result = flexcomp("status", "--of", "can:nocan0:1", expect=4)

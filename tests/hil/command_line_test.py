@@ -130,6 +130,9 @@ try:
     for bad, says in (("push --dry-run cal.yaml", "--to is required"), ("push --against active.yaml --to %s cal.yaml" % bus, "--dry-run"),
                       ("push --dry-run --confirm --to %s" % bus, "--dry-run"), ("push --dry-run --trial 3 --to %s cal.yaml" % bus, "--dry-run"),
                       ("push --dry-run --against active.yaml cal.yaml", "--robot"),
+                      ("push --resume --confirm --to %s" % bus, "--resume"), ("push --resume --to %s" % bus, "CAL.yaml"),
+                      ("push --resume --dry-run --to %s cal.yaml" % bus, "--resume"),
+                      ("push --resume --sequence 7 --to %s cal.yaml" % bus, "--resume"),
                       ("push --dry-run --against active.yaml --to %s --robot tx60l.yaml cal.yaml" % bus, "no --to"),
                       ("pull --from %s -o p.yaml --image ./p.yaml" % bus, "another file"),
                       ("predict --robot tx60l.yaml --joints others.csv -o others.csv", "another file")):

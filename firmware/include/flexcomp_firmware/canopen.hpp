@@ -63,7 +63,9 @@ class CanopenNode {
   std::uint32_t take(const std::uint8_t* bytes, std::uint32_t size);
   std::uint32_t complete();
   std::uint32_t set(const std::uint8_t* bytes, std::uint32_t size);
-  std::uint32_t get(std::uint32_t& size);
+  std::uint32_t get(std::uint32_t& size, std::uint8_t* out);
+  static bool is_small(const std::uint8_t* frame);
+  void upload_beside(const std::uint8_t* frame);
   std::uint32_t command(wire::Command command, std::uint32_t argument);
   bool staging() const;
   void forget();
@@ -92,6 +94,9 @@ class CanopenNode {
   std::uint32_t image_crc_ = 0;
   std::uint32_t argument_ = 0;
   std::uint16_t command_ = 0;
+
+  Transfer repeatable_ = Transfer::none;   ///< whose segment_ the client may ask for again
+  std::array<std::uint8_t, 8> segment_{};  ///< last request of a download, last answer of an upload
 
   bool pending_ = false;
   std::array<std::uint8_t, 8> out_{};

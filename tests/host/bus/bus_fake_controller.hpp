@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,9 @@ struct Controller {
   Refusal verify_refuses = Refusal::none;
   wire::Answer commit_ends = wire::Answer::accepted;
   int busy = 0;           ///< so many commands are answered busy
+  int commits_lost = 0;   ///< so many commits do nothing
   int working_polls = 0;  ///< so many status records say that memory is being written
+  std::function<void()> on_commit;
   bool damages_image = false;
   bool overtaken = false;  ///< another client's command is answered before ours is looked at
 
@@ -70,22 +73,32 @@ struct Controller {
     switch (command) {
       case wire::Command::begin:
         staged.assign(argument, 0);
+        status.state = static_cast<std::uint16_t>(wire::StoreState::receiving);
         return answer(Answer::accepted);
       case wire::Command::verify:
         if (verify_refuses != Refusal::none) return answer(Answer::refused, verify_refuses, 23);
+        status.state = static_cast<std::uint16_t>(wire::StoreState::verified);
         return answer(Answer::accepted);
       case wire::Command::commit:
+        if (on_commit) on_commit();
+        if (commits_lost > 0) {
+          --commits_lost;
+          return answer(Answer::accepted);
+        }
         if (commit_ends == Answer::accepted) {
           active = staged;
           if (damages_image) active[active.size() / 2] ^= 1U;
           status.active_slot = 0;
           status.active_bytes = static_cast<std::uint32_t>(active.size());
-          ++status.active_sequence;
+          status.active_sequence = load_u32(active.data() + 12);
+          status.active_crc = load_u32(active.data() + active.size() - 4);
         }
+        status.state = static_cast<std::uint16_t>(wire::StoreState::idle);
         answer(overtaken ? Answer::busy : commit_ends);
         return Answer::accepted;
       case wire::Command::abort:
         staged.clear();
+        status.state = static_cast<std::uint16_t>(wire::StoreState::idle);
         return Answer::accepted;
       case wire::Command::rollback:
         return answer(Answer::no_previous);
@@ -134,6 +147,13 @@ struct Controller {
 inline Bytes numbered_bytes(std::size_t size) {
   Bytes out(size);
   for (std::size_t k = 0; k < size; ++k) out[k] = static_cast<std::uint8_t>(k * 37U + (k >> 8U));
+  return out;
+}
+
+/// The same with number and CRC where an image has them.
+inline Bytes numbered_image(std::size_t size, std::uint32_t sequence = 1) {
+  Bytes out = numbered_bytes(size);
+  store_u32(out.data() + 12, sequence);
   return out;
 }
 

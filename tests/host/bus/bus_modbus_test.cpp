@@ -27,6 +27,7 @@ namespace {
 
 namespace map = wire::modbus;
 using fake::numbered_bytes;
+using fake::numbered_image;
 using fake::quick;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
@@ -38,7 +39,8 @@ class ModbusServer {
  public:
   fake::Controller device;
   std::atomic<bool> silent{false};
-  std::atomic<int> lose{0};  ///< so many answers are lost
+  std::atomic<int> lose{0};                ///< so many answers are lost
+  std::atomic<bool> loses_commits{false};  ///< of commits; over TCP the connection ends with them
 
   explicit ModbusServer(bool serial) : serial_(serial) {
     if (serial) {
@@ -186,6 +188,11 @@ class ModbusServer {
       --lose;
       return;
     }
+    const auto command = static_cast<wire::Command>(at(map::command)[0]);
+    if (loses_commits && to == map::argument && count != 0 && command == wire::Command::commit) {
+      if (!serial_) ::shutdown(modbus_get_socket(context_), SHUT_RDWR);
+      return;
+    }
     if (answered != wire::Answer::accepted) {
       modbus_reply_exception(context_, query,
                              answered == wire::Answer::busy ? MODBUS_EXCEPTION_SLAVE_OR_SERVER_BUSY
@@ -218,8 +225,9 @@ TEST_P(ModbusClient, PushesAndReadsBack) {
   const auto client = server.client();
   EXPECT_EQ(client->capability().values, 768U);
   // Whole windows, an odd length, less than a window.
+  std::uint32_t sequence = 0;
   for (const std::size_t size : {484U, 1001U, 100U, 2000U, 246U}) {
-    const Bytes image = numbered_bytes(size);
+    const Bytes image = numbered_image(size, ++sequence);
     push_image(*client, image);
     EXPECT_EQ(server.device.active, image) << size;
   }
@@ -230,7 +238,7 @@ TEST_P(ModbusClient, SaysWhyASetWasRefused) {
   server.device.verify_refuses = Refusal::wrong_nominal;
   const auto client = server.client();
   const RefusedByController e =
-      thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(100)); });
+      thrown<RefusedByController>([&] { push_image(*client, numbered_image(100)); });
   EXPECT_EQ(e.answer(), wire::Answer::refused);
   EXPECT_EQ(e.refusal(), Refusal::wrong_nominal);
   EXPECT_EQ(std::string(e.what()), client->where() +
@@ -239,7 +247,7 @@ TEST_P(ModbusClient, SaysWhyASetWasRefused) {
                                        "exception 04, server device failure)");
   EXPECT_TRUE(server.device.active.empty());
   EXPECT_TRUE(server.device.staged.empty());
-  EXPECT_THAT(thrown<RefusedByController>([&] { client->run(wire::Command::rollback); }).what(),
+  EXPECT_THAT(thrown<RefusedByController>([&] { roll_back(*client); }).what(),
               HasSubstr("asked to roll back, the controller refused: there is no previous set"));
 }
 
@@ -247,24 +255,47 @@ TEST_P(ModbusClient, SaysWhatFailedInTheBackground) {
   server.device.commit_ends = wire::Answer::storage_failed;
   server.device.working_polls = 2;
   const auto client = server.client();
-  EXPECT_THAT(thrown<RefusedByController>([&] { push_image(*client, numbered_bytes(100)); }).what(),
+  EXPECT_THAT(thrown<RefusedByController>([&] { push_image(*client, numbered_image(100)); }).what(),
               HasSubstr("asked to commit the set, the controller failed: the controller's non-volatile"));
 }
 
 TEST_P(ModbusClient, JudgesACommitByWhatItDid) {
   server.device.overtaken = true;
   const auto client = server.client();
-  push_image(*client, numbered_bytes(100));
+  push_image(*client, numbered_image(100));
   EXPECT_EQ(server.device.active.size(), 100U);
   server.device.commit_ends = wire::Answer::wrong_state;
-  EXPECT_THROW(push_image(*client, numbered_bytes(100)), RefusedByController);
+  EXPECT_THROW(push_image(*client, numbered_image(100, 2)), RefusedByController);
+}
+
+TEST_P(ModbusClient, ACommitWhoseAnswerIsLostIsJudgedByTheStatus) {
+  server.loses_commits = true;
+  const auto client = server.client();
+  EXPECT_EQ(push_image(*client, numbered_image(100, 4)).active_sequence, 4U);
+  server.device.commit_ends = wire::Answer::storage_failed;
+  EXPECT_THAT(thrown<RefusedByController>([&] { push_image(*client, numbered_image(100, 5)); }).what(),
+              HasSubstr("non-volatile memory failed"));
+  EXPECT_EQ(server.device.status.active_sequence, 4U);
+}
+
+TEST_P(ModbusClient, AControllerThatGoesAwayAfterTheCommitLeavesItOpen) {
+  server.loses_commits = true;
+  const auto client = server.client();
+  // The last window has gone out: announce and verify are answered, the commit and all after it are not.
+  server.device.on_commit = [this] { server.silent = true; };
+  const OutcomeOpen e = thrown<OutcomeOpen>([&] { push_image(*client, numbered_image(100, 4)); });
+  EXPECT_THAT(e.what(), HasSubstr(": open: the controller was asked to commit the set, then: "));
+  server.silent = false;
+  server.loses_commits = false;
+  EXPECT_TRUE(read_back(*client, numbered_image(100, 4)).has_value());
+  EXPECT_FALSE(read_back(*client, numbered_image(100, 5)).has_value());
 }
 
 TEST_P(ModbusClient, FindsADamagedSet) {
   server.device.damages_image = true;
   const auto client = server.client();
-  EXPECT_THAT(thrown<BusError>([&] { push_image(*client, numbered_bytes(100)); }).what(),
-              HasSubstr("byte 50 of the active set is 0x3B after the commit, 0x3A was sent"));
+  EXPECT_THAT(thrown<OutcomeOpen>([&] { push_image(*client, numbered_image(100)); }).what(),
+              HasSubstr("byte 50 of the active set is 0x3B, 0x3A was sent"));
 }
 
 TEST_P(ModbusClient, ProbesWithAllBitsAndTellsTheRobot) {
@@ -278,7 +309,7 @@ TEST_P(ModbusClient, ProbesWithAllBitsAndTellsTheRobot) {
 TEST_P(ModbusClient, WaitsForABusyControllerButNotForEver) {
   server.device.busy = 3;
   const auto client = server.client();
-  push_image(*client, numbered_bytes(50));
+  push_image(*client, numbered_image(50));
   server.device.busy = 1000000;
   const RefusedByController e = thrown<RefusedByController>([&] { client->run(wire::Command::verify); });
   EXPECT_EQ(e.answer(), wire::Answer::busy);

@@ -36,6 +36,15 @@ TEST(Hints, ACodeAddsItsOptions) {
   EXPECT_STREQ(usage_error(ArgumentError(ErrorCode::too_few_poses, "3 poses")).what(), "--poses: 3 poses");
 }
 
+TEST(Hints, WhatIsOpenIsSettledByStatusOrResume) {
+  const OutcomeOpen e("can:vcan0:5", "the controller was asked to commit the set");
+  EXPECT_STREQ(e.what(), "can:vcan0:5: open: the controller was asked to commit the set");
+  EXPECT_EQ(hint(e, "rollback"), "\"flexcomp status --of can:vcan0:5\" says which set runs");
+  EXPECT_EQ(hint(e, "push"),
+            "\"flexcomp status --of can:vcan0:5\" says which set runs; \"flexcomp push --to can:vcan0:5 "
+            "--resume\" with the same file settles it");
+}
+
 TEST(Hints, ATextThatOnlyLooksLikeAnotherErrorGetsNoHint) {
   EXPECT_EQ(hint(InputError("d.csv", 0, "", "a file that can be read", "none"), "identify"), "");
   EXPECT_EQ(hint(DoubtfulResult("a further step would still gain 1 in chi-square"), "identify"), "");
