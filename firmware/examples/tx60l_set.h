@@ -58,7 +58,7 @@ static const uint8_t tx60l_image[1440] = {
 
 /* The seal: a slot's last 32 bytes. */
 static const uint8_t tx60l_seal[32] = {
-    70, 76, 88, 83, 160, 5, 0, 0, 7, 0, 0, 0, 17, 214, 173, 140, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 35, 193, 55, 164};
+    70, 76, 88, 83, 160, 5, 0, 0, 7, 0, 0, 0, 17, 214, 173, 140, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 211, 19, 169, 211};
 
 static const flexcomp_real tx60l_command_rad[FLEXCOMP_JOINTS] = {(flexcomp_real)-1.5625, (flexcomp_real)0.9375, (flexcomp_real)0.78125, (flexcomp_real)-1.875, (flexcomp_real)1.25, (flexcomp_real)3.125};
 

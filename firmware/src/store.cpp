@@ -270,7 +270,7 @@ bool Store::is_in_staging(const Set& set) const {
 }
 
 void Store::boot() {
-  Set found[2];
+  std::array<Set, 2> found{};
   for (unsigned slot = 0; slot < 2; ++slot) {
     found[slot].slot = static_cast<std::uint16_t>(slot);
     read_seals(slot, found[slot]);
@@ -301,7 +301,7 @@ void Store::boot() {
     }
   }
   previous_.index = Handover::none;
-  settle_start();
+  settle_start(found);
   if (active_.index == Handover::none) {
     faults_ |= wire::fault::no_valid_set;
   } else {
@@ -309,30 +309,34 @@ void Store::boot() {
   }
 }
 
+/// A seal of a set, or without one a mark in a slot, however long the memory takes; false where it fails.
+bool Store::add_at_start(Set* set, unsigned slot) {
+  StorageResult r = StorageResult::busy;
+  for (unsigned n = 0; n < most_calls && r == StorageResult::busy; ++n) {
+    r = set != nullptr ? add_seal(*set) : add_mark(slot);
+  }
+  return r == StorageResult::done;
+}
+
 /// Makes the choice of this start that of every later one, before anything follows from it.
-void Store::settle_start() {
+void Store::settle_start(const std::array<Set, 2>& found) {
   if (storage_.write == nullptr) return;
-  const auto repeated = [](auto&& write) {
-    StorageResult r = StorageResult::busy;
-    for (unsigned n = 0; n < most_calls && r == StorageResult::busy; ++n) r = write();
-    return r == StorageResult::done;
-  };
   if (active_.slot != wire::no_slot) {
     // Marks that do not suffice to void this set may be all that is left of a restore that was cut.
-    Set other;
+    const unsigned other = active_.slot ^ 1U;
     const unsigned against = marks_against(active_);
     const unsigned wanted = active_.seals < enough_seals ? active_.seals + 2U : active_.seals;
-    if (against != 0 && !read_seals(active_.slot ^ 1U, other)) erase_at_start(active_.slot ^ 1U);
+    if (against != 0 && found[other].seals == 0) erase_at_start(other);
     // Those that are there may all be marginal; two that are whole outlast a mark that is.
-    while (active_.seals < wanted && repeated([this] { return add_seal(active_); })) {
+    while (active_.seals < wanted && add_at_start(&active_, 0)) {
     }
   }
   // What may be a seal at another start must not count then.
   for (unsigned slot = 0; slot < 2; ++slot) {
     if (slot == active_.slot || slot == previous_.slot) continue;
-    Set seen;
-    seen.slot = static_cast<std::uint16_t>(slot);
-    const bool is_sealed = read_seals(slot, seen);
+    // As it was read when the choice was made: it may read otherwise by now.
+    Set seen = found[slot];
+    const bool is_sealed = seen.seals != 0;
     // A sealed set that this firmware refuses keeps its place where there is no other.
     if (is_sealed && active_.slot == wire::no_slot && is_counted(seen)) continue;
     const std::uint32_t commit = begun(slot);
@@ -340,7 +344,7 @@ void Store::settle_start() {
     if (seen.generation <= active_.generation) continue;
     if (seen.generation > generation_) generation_ = seen.generation;
     bool is_void = true;
-    while (is_void && marks_against(seen) < 3) is_void = repeated([&] { return add_mark(slot ^ 1U); });
+    while (is_void && marks_against(seen) < 3) is_void = add_at_start(nullptr, slot ^ 1U);
     if (!is_void) erase_at_start(slot);
   }
 }
@@ -488,7 +492,8 @@ void Store::checked(Refusal r, std::uint32_t detail) {
   const std::uint32_t ahead = header_.sequence - active_.sequence;
   if (r == Refusal::none &&
       (header_.sequence == 0 || (active_.sequence != 0 && (ahead == 0 || ahead > most_ahead)))) {
-    r = is_ahead(header_.sequence, active_.sequence) ? Refusal::sequence_too_far : Refusal::stale_sequence;
+    r = header_.sequence != 0 && is_ahead(header_.sequence, active_.sequence) ? Refusal::sequence_too_far
+                                                                              : Refusal::stale_sequence;
     detail = active_.sequence;
   }
   if (r != Refusal::none) {

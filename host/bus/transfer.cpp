@@ -76,11 +76,10 @@ std::vector<std::string> beyond_capability(const wire::Capability& capability,
 
 std::uint32_t next_sequence(ControllerClient& client) {
   const wire::Status now = client.status();
-  const std::uint32_t newest = std::max(now.active_sequence, now.previous_sequence);
-  if (newest == std::numeric_limits<std::uint32_t>::max()) {
-    throw BusError(client.where(), "the active set has the highest sequence there is");
-  }
-  return newest + 1;
+  // Serial number arithmetic (RFC 1982); 0 means none.
+  const bool previous_is_newer = now.previous_sequence != 0 && now.previous_sequence - now.active_sequence < 0x80000000U;
+  const std::uint32_t next = (previous_is_newer ? now.previous_sequence : now.active_sequence) + 1;
+  return next != 0 ? next : 1;
 }
 
 void refuse_beyond_capability(const ControllerClient& client, const std::string& source,

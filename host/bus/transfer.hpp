@@ -21,7 +21,7 @@ namespace flexcomp::host {
 void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
                               std::span<const std::uint8_t> image);
 
-/// Next sequence number: one above the newest set of the controller. \throws BusError where 2^32 - 1 is reached
+/// Next sequence number: one above the newest set of the controller; 1 after 2^32 - 1. \throws BusError
 std::uint32_t next_sequence(ControllerClient& client);
 
 struct PushOptions {

@@ -54,6 +54,33 @@ TEST(Store, RefusesASequenceThatIsNotAboveTheActiveOne) {
   EXPECT_EQ(arm.offer(make_image(arm.robot, 8)), Refusal::none);
 }
 
+// The last number of all must not end the pushes for good.
+TEST(Store, SequencesFollowSerialNumberArithmetic) {
+  Arm arm;
+  ASSERT_EQ(arm.push(make_image(arm.robot, 0xFFFFFFFEU)), Answer::accepted);
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 0xFFFFFFFDU)), Refusal::stale_sequence);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 0xFFFFFFFFU)), Answer::accepted);
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 0)), Refusal::stale_sequence);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 0xFFFFFFFFU)), Refusal::stale_sequence);
+  EXPECT_EQ(arm.offer(make_image(arm.robot, 1 + 0x10001U)), Refusal::sequence_too_far);
+  EXPECT_EQ(arm.device->status().detail, 1U);
+  EXPECT_EQ(Arm(arm.flash).sequence(), 1U);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1 + 0x10000U)), Answer::accepted);
+}
+
+// Until then the other slot may hold the only set that can still be read.
+TEST(Store, TheSetInUseIsReadBeforeTheOtherIsErased) {
+  Arm arm;
+  ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 2, 1, 2)), Answer::accepted);
+  const std::uint16_t active = arm.device->status().active_slot;
+  arm.flash.slots[active][300] ^= 4U;
+  EXPECT_EQ(arm.push(make_image(arm.robot, 3)), Answer::storage_failed);
+  EXPECT_EQ(arm.device->status().faults, wire::fault::storage);
+  EXPECT_EQ(Arm(arm.flash).sequence(), 1U);
+}
+
 TEST(Store, RefusesEveryFlippedBit) {
   Arm arm;
   const Bytes good = make_image(arm.robot, 1);

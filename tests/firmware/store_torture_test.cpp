@@ -276,6 +276,10 @@ void torture(std::uint64_t seed, long count, bool rots, Tally& tally, MarginalFl
     session.reset();
     session = std::make_unique<Session>(flash);
   };
+  const auto say = [&](const char* what, long done, std::uint32_t was, std::uint32_t is) {
+    std::printf("seed %llu after %ld cuts: %s, set %u, then %u\n", static_cast<unsigned long long>(seed),
+                done, what, was, is);
+  };
   for (long done = 0; done < count;) {
     const std::uint32_t before = session->sequence(), previous = session->device->status().previous_sequence;
     std::uint32_t after = before;
@@ -308,7 +312,10 @@ void torture(std::uint64_t seed, long count, bool rots, Tally& tally, MarginalFl
         if (session->run(Command::restore_defaults) != Answer::accepted) after = before;
       }
       flash.wears_out = false;
-      if (session->sequence() != after) ++tally.lost;
+      if (session->sequence() != after) {
+        say("not what was acknowledged", done, after, session->sequence());
+        ++tally.lost;
+      }
     } catch (const PowerCut&) {
       is_cut = true;
     }
@@ -347,6 +354,7 @@ void torture(std::uint64_t seed, long count, bool rots, Tally& tally, MarginalFl
       restart();
       now = session->sequence();
       if (now != before && now != after) {
+        say("neither the set before nor the one after", done, before, now);
         if (now == 0 || now == previous) {
           ++tally.lost;
         } else {
@@ -363,6 +371,7 @@ void torture(std::uint64_t seed, long count, bool rots, Tally& tally, MarginalFl
       if (plain == 2 || (!is_cut && below(8) != 0)) break;
       restart();
       if (session->sequence() != now) {
+        say("changed", done, now, session->sequence());
         ++tally.changed;
         now = session->sequence();
       }

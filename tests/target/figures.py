@@ -80,6 +80,9 @@ class CallGraph:
         call that is in the image (the compiler does not note the ones that it makes up itself)."""
         dump = subprocess.run([tools + "objdump", "-d", "--no-show-raw-insn", image], check=True, text=True,
                               capture_output=True).stdout
+        # A number that the linker script defines may lie inside a function, whose own jumps are then told by it.
+        listed = subprocess.run([tools + "nm", image], check=True, text=True, capture_output=True).stdout
+        numbers = set(re.findall(r"^[0-9a-f]+ [Aa] (\S+)$", listed, re.M))
         bytes_of = {"s": 4, "d": 8}
         for name, body in re.findall(r"^[0-9a-f]+ <([^>]+)>:\n((?:.+\n)*)", dump, re.M):
             frame, calls = 0, set()
@@ -106,7 +109,9 @@ class CallGraph:
                 # Calls, and jumps out of the function, which are calls at its end.
                 if re.match(r"(b|bl|blx|bx|cbn?z)\b|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)\b", op):
                     to = re.search(r"<([^>+]+)(\+[^>]*)?>", args)
-                    if to and to[1] != name:
+                    if to and to[1] in numbers:
+                        pass
+                    elif to and to[1] != name:
                         calls.add(to[1])
                     elif not to and (op == "blx" or (op == "bx" and args.strip() != "lr")):
                         calls.add("__indirect_call")

@@ -218,8 +218,9 @@ class Store {
   std::uint32_t begun(unsigned slot);
   std::uint16_t target_slot();
   bool is_counted(const Set& set) const;
-  void settle_start();
+  void settle_start(const std::array<Set, 2>& found);
   void erase_at_start(unsigned slot);
+  bool add_at_start(Set* set, unsigned slot);
   bool load(const Set& set);
   bool is_in_staging(const Set& set) const;
   /// A check that no commit waits for; its client may give it up.
