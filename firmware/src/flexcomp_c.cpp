@@ -494,13 +494,10 @@ int flexcomp_tool_pose(const flexcomp_arm* fc, const flexcomp_real q_reading_rad
   const AtReadings at(arm_of(fc), q_reading_rad, context);
   if (!at.is_valid || at.model == nullptr) return 0;
   const flexcomp::Pose<fw::Scalar> pose = fw::tool_pose(*at.model, at.q, at.context);
-  // w, x, y, z, then the position: loads that are finite may give what is not.
-  flexcomp_real numbers[7];
-  quaternion_of(pose.rotation, numbers);
-  for (int k = 0; k < 3; ++k) numbers[4 + k] = pose.position[k];
-  if (!are_finite(numbers, 7)) return 0;
-  for (int k = 0; k < 3; ++k) xyz_m[k] = numbers[4 + k];
-  for (int k = 0; k < 4; ++k) wxyz[k] = numbers[k];
+  // Loads that are finite may move it by what is not.
+  if (!are_finite(pose.position.data(), 3) || !are_finite(pose.rotation.data(), 9)) return 0;
+  for (int k = 0; k < 3; ++k) xyz_m[k] = pose.position[k];
+  quaternion_of(pose.rotation, wxyz);
   return 1;
 }
 

@@ -39,8 +39,8 @@ inline void play_program(Input input, flexcomp::host::ProgramLanguage language) 
   std::array<double, joint_count> start{};
   start[4] = 0.5;
   reads([&] {
-    const TargetsFile commands = program_commands(program, tx60l(), flexcomp::Pose<double>(), start,
-                                                  [](std::size_t, std::size_t) {});
+    const TargetsFile commands =
+        program_commands(program, tx60l(), flexcomp::Pose<double>(), start, [](std::size_t, std::size_t) {});
     std::vector<std::array<double, joint_count>> q;
     for (const flexcomp::host::Target& t : commands.rows) q.push_back(t.q_rad);
     with_commands(program, tx60l(), flexcomp::Pose<double>(), q);

@@ -438,8 +438,8 @@ class Device {
     require(word(16) == s.active_sequence && word(20) == s.active_bytes,
             "status record and C interface differ");
     require(is_active == (s.active_bytes != 0), "an active set without bytes, or bytes without a set");
-    // Reading is slow: the same set need not be read twice.
-    if (is_active && (crc != seen_crc_ || crc == 0)) {
+    // Reading is slow: the same set need not be read twice. While rollback and restore erase its slot it cannot be read.
+    if (is_active && s.store != 3 && (crc != seen_crc_ || crc == 0)) {
       Bytes image(s.active_bytes);
       for (std::size_t at = 0; at < image.size(); at += 246) {
         const std::size_t size = std::min<std::size_t>(246, image.size() - at);
@@ -518,7 +518,8 @@ class Device {
     if (status != FLEXCOMP_REFUSED) is_placed_ = true;
     for (const flexcomp_real v : out) {
       require(std::isfinite(v), "a number that is not finite left a step");
-      require(!is_placed_ || std::abs(v) <= static_cast<flexcomp_real>(most_rad), "a joint beyond its limit left a step");
+      require(!is_placed_ || std::abs(v) <= static_cast<flexcomp_real>(most_rad),
+              "a joint beyond its limit left a step");
     }
     const std::uint32_t flags = flexcomp_step_flags(arm_);
     require(flags < 256, "a flag without a meaning");
@@ -646,7 +647,8 @@ class Device {
   flexcomp_rtu* rtu_ = nullptr;
   std::array<flexcomp_tcp*, connections + 1> tcp_{};
   bool is_dead_ = false;
-  bool is_placed_ = false;  ///< by a command that was used or by start: before that a refused command goes out as it is
+  bool is_placed_ =
+      false;  ///< by a command that was used or by start: before that a refused command goes out as it is
   std::int64_t power_left_ = -1;
   unsigned fail_next_ = 0;
   unsigned busy_next_ = 0;
