@@ -9,6 +9,7 @@
 
 #include "measurement/measured_data.hpp"
 #include "model/effects.hpp"
+#include "model/paper_model.hpp"
 
 namespace flexcomp::host {
 

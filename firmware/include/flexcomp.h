@@ -446,13 +446,14 @@ int flexcomp_uncorrect(const flexcomp_arm* fc, const flexcomp_real q_reading_rad
 
 /** True pose of the tool frame in F0 at joint readings, by the forward model with all effects (docs/model.md, M15):
  * origin, and Hamilton quaternion (w, x, y, z) with w >= 0. 0, and nothing is written, without a set or where a
- * number is not finite. BOTH contexts; a pass. */
+ * number, of the arguments or of the result, is not finite. BOTH contexts; a pass. */
 int flexcomp_tool_pose(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
                        const flexcomp_context* context, flexcomp_real xyz_m[3], flexcomp_real wxyz[4]);
 
 /** What loads do to the joints at their readings: torque about each joint by payload and external force, the
  * links' weight left out (docs/model.md, M11), and the angle by which all effects but constant ones turn it. 0, and
- * nothing is written, without a set or where a number is not finite. BOTH contexts; a pass. */
+ * nothing is written, without a set or where a number, of the arguments or of the result, is not finite. BOTH contexts; a
+ * pass. */
 int flexcomp_joint_loads(const flexcomp_arm* fc, const flexcomp_real q_reading_rad[FLEXCOMP_JOINTS],
                          const flexcomp_context* context, flexcomp_real torque_nm[FLEXCOMP_JOINTS],
                          flexcomp_real deflection_rad[FLEXCOMP_JOINTS]);

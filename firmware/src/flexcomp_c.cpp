@@ -137,6 +137,13 @@ Tcp& tcp_of(flexcomp_tcp* tcp) { return *reinterpret_cast<Tcp*>(tcp); }
 /// or as the target's scalar.
 fw::Scalar scalar(double v) { return flexcomp::from_binary64<fw::Scalar>(v); }
 
+bool are_finite(const fw::Scalar* values, std::size_t count) {
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!flexcomp::is_finite(values[k])) return false;
+  }
+  return true;
+}
+
 /// True where all members after the name, which are doubles, are finite.
 bool all_finite(const flexcomp_robot& robot) {
   constexpr std::size_t first = offsetof(flexcomp_robot, links);
@@ -487,6 +494,8 @@ int flexcomp_tool_pose(const flexcomp_arm* fc, const flexcomp_real q_reading_rad
   const AtReadings at(arm_of(fc), q_reading_rad, context);
   if (!at.is_valid || at.model == nullptr) return 0;
   const flexcomp::Pose<fw::Scalar> pose = fw::tool_pose(*at.model, at.q, at.context);
+  // Loads that are finite may move it by what is not.
+  if (!are_finite(pose.position.data(), 3) || !are_finite(pose.rotation.data(), 9)) return 0;
   for (int k = 0; k < 3; ++k) xyz_m[k] = pose.position[k];
   quaternion_of(pose.rotation, wxyz);
   return 1;
@@ -498,6 +507,8 @@ int flexcomp_joint_loads(const flexcomp_arm* fc, const flexcomp_real q_reading_r
   const AtReadings at(arm_of(fc), q_reading_rad, context);
   if (!at.is_valid || at.model == nullptr) return 0;
   const flexcomp::JointLoads<fw::Scalar, fw::joints> loads = fw::loads_of_joints(*at.model, at.q, at.context);
+  if (!are_finite(loads.torque_nm.data(), fw::joints) || !are_finite(loads.deflection_rad.data(), fw::joints))
+    return 0;
   for (std::size_t j = 0; j < fw::joints; ++j) {
     torque_nm[j] = loads.torque_nm[j];
     deflection_rad[j] = loads.deflection_rad[j];

@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <charconv>
+#include <sstream>
 #include <utility>
 
 #include "files/read_file.hpp"
@@ -32,6 +35,35 @@ std::string describe(const YAML::Node& node) {
   }
 }
 
+/// Where the first node of a document stands.
+class FirstNode : public YAML::EventHandler {
+ public:
+  const YAML::Mark& mark() const { return mark_; }
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { see(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { see(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t, const std::string&) override {
+    see(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    see(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    see(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void see(const YAML::Mark& mark) {
+    if (mark_.is_null()) mark_ = mark;
+  }
+  YAML::Mark mark_ = YAML::Mark::null_mark();
+};
+
 }  // namespace
 
 YamlField::YamlField(YAML::Node node, std::string file, std::string path, std::size_t line)
@@ -41,10 +73,15 @@ YamlField YamlField::load(const std::string& path) { return parse(read_file(path
 
 YamlField YamlField::parse(const std::string& text, const std::string& name) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      throw InputError(name, line_of(documents[1].Mark()), "", "one YAML document", "another one behind ---");
-    YamlField root(documents.empty() ? YAML::Node() : documents.front(), name, "", 1);
+    // Not YAML::LoadAll(): yaml-cpp 0.7 takes what is left behind a document ("a"\nb: {) for endless empty ones.
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    FirstNode first;
+    FirstNode second;
+    if (parser.HandleNextDocument(first) && parser.HandleNextDocument(second)) {
+      throw InputError(name, line_of(second.mark()), "", "one YAML document", "another one behind it");
+    }
+    YamlField root(YAML::Load(text), name, "", 1);
     if (!root.node_.IsMap()) throw InputError(name, 0, "", "a mapping (key: value)", describe(root.node_));
     return root;
   } catch (const YAML::Exception& e) {

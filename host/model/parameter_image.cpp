@@ -90,12 +90,13 @@ Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const Ro
   if (refusal == Refusal::none)
     refusal = visit_image<double>(bytes.data(), bytes.size(), Collector{calibration.terms});
   if (refusal != Refusal::none) throw refuse(fmt::format("that {}", text(refusal)));
+  // Before names are looked for, which reads the tables as far as they say that they go.
+  prepare(calibration.terms, robot, source);
   try {
     canonical(calibration.terms, robot.nominal);
   } catch (const std::invalid_argument& e) {
     throw refuse(fmt::format("terms that have no name in the catalogue: {}", e.what()));
   }
-  prepare(calibration.terms, robot, source);
   calibration.path = source;
   calibration.robot = robot.name;
   calibration.nominal_hash = header.nominal_hash;

@@ -389,6 +389,14 @@ TEST(AtReadings, UncorrectFindsTheCommandAndTheToolIsWhereTheNominalArmHasIt) {
   bad.force_n[2] = std::numeric_limits<Scalar>::infinity();
   EXPECT_EQ(flexcomp_tool_pose(arm.fc, bench::some_joints().data(), &bad, untouched.data(), untouched.data()),
             0);
+  // Finite, and its torque is not: nothing of it goes out.
+  bad.force_n[2] = std::numeric_limits<Scalar>::max();
+  bad.payload_com_m[0] = std::numeric_limits<Scalar>::max();
+  EXPECT_EQ(flexcomp_tool_pose(arm.fc, bench::some_joints().data(), &bad, untouched.data(), untouched.data()),
+            0);
+  EXPECT_EQ(
+      flexcomp_joint_loads(arm.fc, bench::some_joints().data(), &bad, untouched.data(), untouched.data()), 0);
+  EXPECT_EQ(untouched, Joints({7, 7, 7, 7, 7, 7}));
 }
 
 TEST(AtReadings, AStartByUncorrectMovesNothing) {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <random>
 
+#include "flexcomp/image.hpp"
 #include "model/effects.hpp"
 #include "model/parameter_image.hpp"
 #include "support/robot_files.hpp"
@@ -97,6 +98,8 @@ TEST(CalibrationFile, OneDocumentAndEachParameterOfTheCovarianceOnce) {
   refused("robot: staubli-tx60l\n" + replaced(factor, "link1.theta_deg", "link1.d_mm"), 4,
           "covariance_factor[2].parameter", {"each parameter once"});
   refused("robot: staubli-tx60l\n---\nrobot: another\n", 3, "", {"one YAML document"});
+  // What is left behind a document, which yaml-cpp's own list of documents never ends with.
+  EXPECT_THROW(load("\",\"\nname: Pose\ntime: {cem\"}\n"), InputError);
 }
 
 TEST(CalibrationFile, ReadsEveryKeyOfTheCatalogue) {
@@ -214,6 +217,21 @@ TEST(Image, RefusesEveryTruncationAndEveryAlteredByte) {
   const Robot other = support::robot("ur5");
   expect_refused([&] { calibration_from_image(image, other, "can:vcan0"); }, 0, "",
                  {"can:vcan0", "another robot"});
+}
+
+TEST(Image, RefusesATableThatSaysItIsLarger) {
+  std::vector<std::uint8_t> image = make_image(load(full), tx60l(), 1, {.allow_unnamed = true});
+  int tables = 0;
+  for (std::size_t at = image::header_bytes; !at_end({.at = at}, image.size());
+       at += image::record_head_bytes + load_u16(image.data() + at + 2)) {
+    if (load_u16(image.data() + at) != image::record_table || load_u16(image.data() + at + 4) == 0) continue;
+    ++tables;
+    std::vector<std::uint8_t> altered = image;
+    store_u16(altered.data() + at + 4, 60);
+    store_u32(altered.data() + altered.size() - 4, crc32(altered.data(), altered.size() - 4));
+    EXPECT_THROW(calibration_from_image(altered, tx60l(), "bus"), InputError);
+  }
+  EXPECT_GT(tables, 0);
 }
 
 TEST(CalibrationFile, RefusesUnknownNamesWithTheNearest) {

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// A calibration file, written again and read again, and as an image and back.
+#include <algorithm>
+#include <tuple>
+#include <vector>
+
+#include "files/calibration_file.hpp"
+#include "host_text.hpp"
+#include "model/parameter_image.hpp"
+
+namespace fuzz::calibration_yaml_target {
+namespace {
+
+using namespace flexcomp::host;
+
+/// What makes each term, in an order that does not depend on that of the links in the file.
+auto sorted(const std::vector<flexcomp::Term<double>>& terms) {
+  std::vector<std::tuple<unsigned, unsigned, unsigned, unsigned, unsigned, double, double>> all;
+  for (const auto& t : terms) {
+    all.emplace_back(t.place.body, t.place.slot, static_cast<unsigned>(t.basis), t.joint,
+                     static_cast<unsigned>(t.effect), t.coefficient, t.argument);
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+void run(Input input) {
+  const Robot& robot = tx60l();
+  const std::string text = input.text();
+  Calibration calibration;
+  if (!reads([&] { calibration = load_calibration(path_of(text), robot); })) return;
+  const std::string written = calibration_text(calibration, robot);
+  Calibration again;
+  must_read(written, [&] { again = load_calibration(path_of(written), robot); });
+  require_same(written, calibration_text(again, robot), "a calibration file");
+  require(sorted(again.terms.terms) == sorted(calibration.terms.terms),
+          "other terms are read from what was written");
+  require(calibration.terms.values == again.terms.values,
+          "other table values are read from what was written");
+
+  // Admitted or not; what is no image at all is refused.
+  reads([&] { make_image(calibration, robot, 1); });
+  std::vector<std::uint8_t> image;
+  if (!reads([&] {
+        image = make_image(calibration, robot, 1, {.allow_unnamed = true, .allow_inadmissible = true});
+      }))
+    return;
+  Calibration back;
+  must_read("(an image)", [&] { back = calibration_from_image(image, robot, "image"); });
+  std::vector<std::uint8_t> second;
+  must_read("(an image)", [&] {
+    second = make_image(back, robot, 1, {.allow_unnamed = true, .allow_inadmissible = true});
+  });
+  require(image == second, "an image differs when it is read and made again");
+}
+
+std::vector<Bytes> seeds() {
+  const std::string paper = file_of("tests/data/tx60l_table1.yaml");
+  std::vector<Bytes> all{bytes_of(paper)};
+  all.push_back(
+      bytes_of(paper +
+               "  - {effect: joint_curve, joint: 1, coefficients_rad: [0, 1.0e-4, 0, -1.0e-4, 0, 0]}\n"
+               "  - {effect: unnamed, place: link3.theta, of: [q2, payload_kg], grid: [[-30, 30], [0, 5]], "
+               "values_rad: [[0, 1], [2, 0]]}\n"
+               "  - {effect: thermal_growth, link: 4, per_k: 1.0e-6}\n"
+               "frames: {f: {xyz_mm: [1, 2, 3], quaternion_wxyz: [1, 0, 0, 0]}, e: {xyz_mm: [1, 2, 3]}}\n"));
+  // Every example of the list of effects.
+  const std::string page = file_of("docs/effects.md");
+  std::string effects = "effects:\n";
+  for (std::size_t at = page.find("- {effect:"); at != std::string::npos;
+       at = page.find("- {effect:", at + 1)) {
+    const std::string entry = page.substr(at, page.find('\n', at) - at);
+    all.push_back(bytes_of("effects:\n  " + entry + "\n"));
+    effects += "  " + entry + "\n";
+  }
+  all.push_back(bytes_of(effects));
+  return all;
+}
+
+const Register registered({"calibration_yaml", run, seeds, mutate_words<yaml_words>});
+
+}  // namespace
+}  // namespace fuzz::calibration_yaml_target

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Modbus requests from bytes of an input, for a line and for connections.
+#pragma once
+
+#include "whole_device.hpp"
+
+namespace fuzz {
+
+/// A PDU: of the map (most of the time) or any bytes.
+inline Bytes modbus_request(Input& input) {
+  // Blocks of modbus_map.hpp, their ends, and what lies between them.
+  static constexpr std::uint16_t addresses[] = {0x0000, 0x003F, 0x0040, 0x006F, 0x0070, 0x00A0, 0x00A1,
+                                                0x00A2, 0x00A3, 0x0100, 0x0101, 0x0102, 0x017A, 0x0200,
+                                                0x0201, 0x0202, 0x0300, 0x036B, 0x036C, 0x0380, 0x03A3,
+                                                0x0400, 0x0500, 0x061F, 0x0700, 0x075B, 0xFFFF};
+  const auto address = [&input] {
+    const unsigned k = input.u8();
+    return k == 255 ? unsigned{input.u16()}
+                    : unsigned{addresses[k % (sizeof addresses / sizeof addresses[0])]};
+  };
+  const auto put16 = [](Output& out, unsigned v) { out.u8(v >> 8U & 0xFFU).u8(v & 0xFFU); };
+  Output out;
+  switch (input.u8() % 12) {
+    case 0:
+      return input.bytes(input.u8());
+    case 1:
+    case 2: {  // read
+      out.u8(3U + (input.u8() & 1U));
+      put16(out, address());
+      put16(out, input.u8());
+      return out.out;
+    }
+    case 3: {  // write one
+      out.u8(6);
+      put16(out, address());
+      put16(out, input.u16());
+      return out.out;
+    }
+    case 4: {  // write many
+      const unsigned count = input.u8() % 124;
+      out.u8(16);
+      put16(out, address());
+      put16(out, count);
+      out.u8(2 * count);
+      Bytes values = input.bytes(2 * std::size_t{count});
+      values.resize(2 * std::size_t{count});
+      return out.add(values).out;
+    }
+    case 5: {  // read and write
+      const unsigned count = input.u8() % 122;
+      out.u8(23);
+      put16(out, address());
+      put16(out, input.u8());
+      put16(out, address());
+      put16(out, count);
+      out.u8(2 * count);
+      Bytes values = input.bytes(2 * std::size_t{count});
+      values.resize(2 * std::size_t{count});
+      return out.add(values).out;
+    }
+    case 6:  // argument and command
+      out.u8(16).u8(0).u8(0xA0).u8(0).u8(3).u8(6).u8(0).u8(0);
+      put16(out, input.u16());
+      put16(out, input.u8() % 12);
+      return out.out;
+    case 7:  // diagnostics
+      out.u8(8);
+      put16(out, input.u8() % 24);
+      return out.add(input.bytes(input.u8() % 16)).out;
+    case 8:  // identification
+      return out.u8(43).u8(14).u8(input.u8() % 6).u8(input.u8() % 5).out;
+    case 9:
+      return out.u8(input.u8()).out;
+    case 10: {  // probe and its answer
+      out.u8(23);
+      put16(out, 0x0380);
+      put16(out, 36);
+      put16(out, 0x0300);
+      put16(out, 109);
+      out.u8(218);
+      Bytes values = input.bytes(input.u8() % 217);
+      values.resize(216);
+      out.add(values);
+      put16(out, input.u8() % 4);
+      return out.out;
+    }
+    default: {  // some bytes of a good image into staging: command 6 of this list announces it
+      const Bytes image = good_image(input.u8(), input.u8());
+      const std::size_t at = std::min<std::size_t>(240 * std::size_t{input.u8()}, image.size());
+      const std::size_t size = std::min<std::size_t>(image.size() - at, 240);
+      const unsigned count = static_cast<unsigned>(size + 1) / 2 + 2;
+      out.u8(16).u8(1).u8(0);
+      put16(out, count);
+      out.u8(2 * count).u8(0).u8(0);
+      put16(out, static_cast<unsigned>(at));
+      out.add(Bytes(image.begin() + static_cast<std::ptrdiff_t>(at),
+                    image.begin() + static_cast<std::ptrdiff_t>(at + size)));
+      if (size % 2 != 0) out.u8(0);
+      return out.out;
+    }
+  }
+}
+
+/// What a master sends, in the form that modbus_request() reads: `image` announced and staged, then `command`.
+/// Each request begins with `before`.
+inline Bytes modbus_push(const Bytes& before, unsigned image, unsigned sequence, unsigned command) {
+  const std::size_t size = good_image(image, sequence).size();
+  Output out;
+  out.add(before).u8(6).u16(static_cast<unsigned>(size)).u8(1);
+  for (unsigned k = 0; 240 * std::size_t{k} < size; ++k) out.add(before).u8(11).u8(image).u8(sequence).u8(k);
+  out.add(before).u8(6).u16(0).u8(command);
+  return out.out;
+}
+
+/// The kinds of requests of modbus_request(), one each.
+inline std::vector<Bytes> modbus_samples() {
+  std::vector<Bytes> all;
+  for (unsigned k = 0; k < 27; ++k) all.push_back(Output().u8(1).u8(k).u8(k).u8(k % 3 == 0 ? 64 : 2).out);
+  for (unsigned k = 0; k < 27; k += 2) all.push_back(Output().u8(3).u8(k).u16(k).out);
+  for (unsigned k = 5; k < 22; k += 2) all.push_back(Output().u8(4).u8(2).u8(k).u32(k).out);
+  for (unsigned k = 0; k < 24; k += 3) all.push_back(Output().u8(7).u8(k).u8(2).u16(k).out);
+  for (unsigned k = 0; k < 6; ++k) all.push_back(Output().u8(8).u8(k).u8(k).out);
+  all.push_back(Output().u8(5).u8(2).u8(14).u8(123).u8(13).u32(0).out);
+  all.push_back(Output().u8(9).u8(17).out);
+  all.push_back(Output().u8(9).u8(11).out);
+  all.push_back(Output().u8(10).u8(8).u32(0).u32(0x3FD00000).u8(1).out);
+  all.push_back(Output().u8(10).u8(0).u8(2).out);
+  all.push_back(Output().u8(0).u8(3).u8(1).u8(2).u8(3).out);
+  return all;
+}
+
+}  // namespace fuzz
