@@ -551,7 +551,7 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
                                 uint16_t heartbeat_ms, flexcomp_can_send send, void* user);
 /** Takes a data frame with an 11-bit identifier from the bus; any may be given, and those of other nodes are
  * ignored. Not from the receive interrupt, if that may hold up the cycle: put frames into a queue there.
- * BACKGROUND; small and one frame sent, but for the frame that
+ * BACKGROUND; small and one frame sent, of a block upload eight, but for the frame that
  *   begins an image (clears FLEXCOMP_STAGING_BYTES),
  *   reads one (one `read` of up to 576 bytes),
  *   ends a probe (two steps),
@@ -559,8 +559,13 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
  *   rolls back (one `read`, and a check). */
 void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, size_t size);
 /** Background work of a node: boot-up, heartbeat, timeouts, frames that could not be sent. Every few
- * milliseconds. BACKGROUND; small, at most three frames sent. */
+ * milliseconds. BACKGROUND; small, at most eleven frames sent (eight are segments of a block upload, which
+ * pauses while the queue is full). */
 void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms);
+/** Frames of an image that a client may send without an answer (SDO block download), 3 ... 63; 63 without this
+ * call. Not more than your receive queue holds: what it loses is sent again, which takes time. 0: no block
+ * transfers, which doubles the bus load of a push. BACKGROUND; small, no hook. */
+void flexcomp_can_set_block_size(flexcomp_can* can, unsigned frames);
 
 /* --- Modbus -------------------------------------------------------------------------------------- */
 

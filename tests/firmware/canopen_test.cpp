@@ -208,8 +208,6 @@ TEST_F(Canopen, AbortCodes) {
   EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), co::abort::device_state) << "nothing staged";
   EXPECT_EQ(command(static_cast<Command>(99)), co::abort::value);
   EXPECT_EQ(command(Command::rollback), co::abort::device_state);
-  EXPECT_EQ(code(ask(head(0xC0, co::image, 1))), co::abort::command) << "block download";
-  EXPECT_EQ(code(ask(head(0xA0, co::image, 2))), co::abort::command) << "block upload";
   EXPECT_EQ(code(ask(head(0xE0, 0, 0))), co::abort::command);
   EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
   EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
@@ -495,7 +493,7 @@ TEST_F(Canopen, SurvivesMillionsOfBytes) {
     } else {
       node.receive(co::sdo_request_id + node_id, f.data(), 8);
     }
-    ASSERT_LE(sent.size(), 3U);
+    ASSERT_LE(sent.size(), 3U + CanopenNode::segments_per_call);
     if (k % 16 == 0) poll(random() % 50);
   }
   EXPECT_FALSE(arm.flash.double_writes);

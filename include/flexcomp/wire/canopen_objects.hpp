@@ -58,8 +58,9 @@
 ///   out in the background (verify, commit and so on) is only there: poll 0x2002:1 until it is not 3.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by a bounded motion,
 ///   because between the two a controller would run a set that it can no longer read back.
-/// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
-///   with 0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).
+/// - SDO is served in pre-operational and operational: expedited, segmented, and in blocks with CRC (CiA 301,
+///   7.2.4.3). A sub-block of a download has at most most_segments, and sizes of sub-blocks alternate between
+///   two numbers, so that a frame that comes twice is known.
 #ifndef FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 #define FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 
@@ -100,6 +101,22 @@ constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2
 constexpr std::uint32_t load_signature = 0x64616F6C;  ///< "load", CiA 301 7.5.2.14
 constexpr std::uint32_t product_code = 0x464C5831;    ///< "FLX1"
 
+/// Segments of a sub-block, at most, where flexcomp chooses. With fewer than 64 no number of a segment looks like
+/// the start of an upload (40h) or its answer (43h … 4Fh): a master that polls over the same channel is told apart.
+constexpr std::uint8_t most_segments = 63;
+
+/// Continues CRC-16 CCITT (x^16 + x^12 + x^5 + 1, from 0; CiA 301, 7.2.4.3.16) over more bytes.
+inline std::uint16_t crc16(std::uint16_t crc, const std::uint8_t* bytes, std::uint32_t size) {
+  constexpr std::uint16_t of_nibble[16] = {0x0000, 0x1021, 0x2042, 0x3063, 0x4084, 0x50A5, 0x60C6, 0x70E7,
+                                           0x8108, 0x9129, 0xA14A, 0xB16B, 0xC18C, 0xD1AD, 0xE1CE, 0xF1EF};
+  unsigned c = crc;
+  for (std::uint32_t k = 0; k < size; ++k) {
+    c = ((c << 4U) & 0xFFFFU) ^ of_nibble[(c >> 12U) ^ (bytes[k] >> 4U)];
+    c = ((c << 4U) & 0xFFFFU) ^ of_nibble[(c >> 12U) ^ (bytes[k] & 15U)];
+  }
+  return static_cast<std::uint16_t>(c);
+}
+
 // COB-IDs of the pre-defined connection set (CiA 301, 7.3.5).
 constexpr std::uint16_t nmt_id = 0x000;          ///< NMT commands, from the master
 constexpr std::uint16_t sdo_answer_id = 0x580;   ///< + node, server to client
@@ -129,6 +146,9 @@ constexpr std::uint32_t none = 0;                     ///< no abort
 constexpr std::uint32_t toggle = 0x05030000;          ///< toggle bit not alternated
 constexpr std::uint32_t timeout = 0x05040000;         ///< SDO protocol timed out
 constexpr std::uint32_t command = 0x05040001;         ///< command specifier not valid or unknown
+constexpr std::uint32_t block_size = 0x05040002;      ///< invalid block size
+constexpr std::uint32_t sequence = 0x05040003;        ///< invalid sequence number, of a block
+constexpr std::uint32_t crc = 0x05040004;             ///< CRC error, of a block transfer
 constexpr std::uint32_t out_of_memory = 0x05040005;   ///< out of memory
 constexpr std::uint32_t write_only = 0x06010001;      ///< attempt to read a write-only object
 constexpr std::uint32_t read_only = 0x06010002;       ///< attempt to write a read-only object
