@@ -77,6 +77,10 @@ void CanopenNode::reset() {
   argument_ = 0;
   command_ = 0;
   heartbeat_time_ = settings_.heartbeat_ms;
+  faults_told_ = 0;
+  inhibited_ = false;
+  emergency_id_ = co::emergency_id + static_cast<std::uint32_t>(settings_.node);
+  emergency_inhibit_ = co::emergency_inhibit_default;
   state_ = co::NmtState::initialising;
   boot_up_ = true;
 }
@@ -179,10 +183,89 @@ void CanopenNode::poll(std::uint32_t now_ms) {
     if (transmit_.send != nullptr && transmit_.send(transmit_.user, heartbeat, beat, 1))
       heartbeat_ms_ = now_ms;
   }
+  observe_faults();
+  send_emergency(now_ms);
   if (now_ms - touched_ms_ >= settings_.sdo_timeout_ms) {
     if (transfer_ != Transfer::none) abort(co::abort::timeout);
     repeatable_ = Transfer::none;
   }
+}
+
+// --- emergencies --------------------------------------------------------------------------------------
+
+namespace {
+
+struct FaultCode {
+  std::uint16_t fault;
+  std::uint16_t code;
+};
+
+constexpr FaultCode fault_codes[] = {
+    {wire::fault::storage, co::emergency_code::storage},
+    {wire::fault::no_valid_set, co::emergency_code::no_valid_set},
+    {wire::fault::older_slot, co::emergency_code::older_slot},
+    {wire::fault::trial_reverted, co::emergency_code::trial_reverted},
+};
+
+}  // namespace
+
+/// Puts new faults into 0x1003. One that comes and goes again and again takes one entry.
+void CanopenNode::observe_faults() {
+  const std::uint16_t faults = device_.store().faults();
+  for (const FaultCode& f : fault_codes) {
+    if ((faults & f.fault) == 0 || (faults_seen_ & f.fault) != 0) continue;
+    const std::uint32_t entry = f.code | static_cast<std::uint32_t>(faults) << 16U;
+    if (history_size_ != 0 && history_[0] == entry) continue;
+    if (history_size_ < history_.size()) ++history_size_;
+    for (std::size_t k = history_size_ - 1U; k > 0; --k) history_[k] = history_[k - 1];
+    history_[0] = entry;
+  }
+  faults_seen_ = faults;
+}
+
+/// Sends the EMCY that is due, at most one: a fault that nobody was told of, or that some have disappeared.
+void CanopenNode::send_emergency(std::uint32_t now_ms) {
+  if (inhibited_ && now_ms - emergency_ms_ < (emergency_inhibit_ + 9U) / 10U) return;
+  inhibited_ = false;
+  if (state_ != co::NmtState::pre_operational && state_ != co::NmtState::operational) return;
+  if ((emergency_id_ & co::emergency_off) != 0) return;
+  const std::uint16_t faults = device_.store().faults();
+  std::uint16_t told = faults_told_;
+  std::uint16_t code = co::emergency_code::none;
+  if ((told & ~faults) != 0) {
+    told = told & faults;
+  } else {
+    for (const FaultCode& f : fault_codes) {
+      if ((faults & ~told & f.fault) == 0) continue;
+      code = f.code;
+      told = told | f.fault;
+      break;
+    }
+  }
+  if (told == faults_told_) return;
+  wire::Status status;
+  device_.store().status(status);
+  std::uint8_t frame[8] = {};
+  store_u16(frame, code);
+  frame[2] = faults != 0 ? 1 : 0;
+  store_u16(frame + 3, faults);
+  store_u16(frame + 5, status.refusal);
+  const std::uint16_t id = static_cast<std::uint16_t>(emergency_id_);
+  if (transmit_.send == nullptr || !transmit_.send(transmit_.user, id, frame, 8)) return;
+  faults_told_ = told;
+  emergency_ms_ = now_ms;
+  inhibited_ = emergency_inhibit_ != 0;
+}
+
+/// Writes 0x1014: bits of the identifier change only while EMCY is off (CiA 301, 7.5.2.17).
+std::uint32_t CanopenNode::set_emergency_id(std::uint32_t id) {
+  constexpr std::uint32_t identifier = 0x7FF;
+  if ((id & ~(co::emergency_off | identifier)) != 0 || co::is_restricted(id & identifier))
+    return co::abort::value;
+  const bool same = ((id ^ emergency_id_) & identifier) == 0;
+  if (!same && (emergency_id_ & co::emergency_off) == 0) return co::abort::value;
+  emergency_id_ = id;
+  return co::abort::none;
 }
 
 // --- SDO server ---------------------------------------------------------------------------------------
@@ -793,6 +876,15 @@ std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
     case co::restore_parameters:
       if (load_u32(bytes) != co::load_signature) return co::abort::not_stored;
       return command(wire::Command::restore_defaults, 0);
+    case co::error_history:
+      if (bytes[0] != 0) return co::abort::value;
+      history_size_ = 0;
+      return co::abort::none;
+    case co::emergency:
+      return set_emergency_id(load_u32(bytes));
+    case co::emergency_inhibit:
+      emergency_inhibit_ = load_u16(bytes);
+      return co::abort::none;
     case co::heartbeat_time:
       heartbeat_time_ = load_u16(bytes);
       return co::abort::none;
@@ -827,6 +919,16 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
       break;
     case co::error_register:
       number = device_.store().faults() != 0 ? 1U : 0U;
+      break;
+    case co::error_history:
+      if (sub_ > history_size_) return co::abort::no_data;
+      number = sub_ == 0 ? history_size_ : history_[sub_ - 1U];
+      break;
+    case co::emergency:
+      number = emergency_id_;
+      break;
+    case co::emergency_inhibit:
+      number = emergency_inhibit_;
       break;
     case co::device_name:
     case co::software_version: {

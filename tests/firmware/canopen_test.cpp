@@ -120,7 +120,8 @@ class Canopen : public testing::Test {
   }
 
   Arm arm;
-  std::vector<Sent> sent;
+  std::vector<Sent> sent;         ///< but for EMCY
+  std::vector<Sent> emergencies;  ///< EMCY
   bool full = false;
   std::uint32_t last_code = 0;
   CanopenNode node{*arm.device,
@@ -129,7 +130,8 @@ class Canopen : public testing::Test {
                    {this, [](void* self, std::uint16_t id, const std::uint8_t* b, std::uint8_t n) {
                       auto& t = *static_cast<Canopen*>(self);
                       if (t.full) return false;
-                      t.sent.push_back({id, Bytes(b, b + n)});
+                      const bool emergency = id == co::emergency_id + node_id;
+                      (emergency ? t.emergencies : t.sent).push_back({id, Bytes(b, b + n)});
                       return true;
                     }}};
 };
@@ -321,6 +323,147 @@ TEST_F(Canopen, PushPullAndProbe) {
   EXPECT_EQ(number(co::status_summary, 5), 0U);
 }
 
+Bytes emcy(std::uint16_t code, std::uint8_t faults, Refusal refusal = Refusal::none) {
+  Bytes out(8);
+  store_u16(out.data(), code);
+  out[2] = faults != 0 ? 1 : 0;
+  out[3] = faults;
+  store_u16(out.data() + 5, static_cast<std::uint16_t>(refusal));
+  return out;
+}
+
+TEST_F(Canopen, EmergenciesForFaultsThatComeAndGo) {
+  using namespace wire::fault;
+  namespace ec = co::emergency_code;
+  const auto told = [this](std::uint32_t ms = 1) {
+    emergencies.clear();
+    poll(ms);
+    Bytes out;
+    for (const Sent& s : emergencies) {
+      EXPECT_EQ(s.id, 0x085);
+      out.insert(out.end(), s.bytes.begin(), s.bytes.end());
+    }
+    EXPECT_LE(emergencies.size(), 1U);
+    return out;
+  };
+  ASSERT_EQ(emergencies.size(), 1U) << "after the boot-up message";
+  EXPECT_EQ(emergencies[0].bytes, emcy(ec::no_valid_set, no_valid_set));
+  EXPECT_EQ(number(0x1003, 0), 1U);
+  EXPECT_EQ(number(0x1003, 1), 0x00016301U);
+  EXPECT_EQ(told(1000), Bytes()) << "once";
+
+  // The fault goes with the first set; the history keeps it until it is emptied.
+  download(co::image, 1, make_image(arm.robot, 5));
+  expedited(0x1010, 1, co::save_signature, 4);
+  Bytes all;
+  for (int k = 0; k < 100; ++k) {
+    const Bytes now = told();
+    all.insert(all.end(), now.begin(), now.end());
+  }
+  EXPECT_EQ(all, emcy(ec::none, 0));
+  EXPECT_EQ(upload(0x1001, 0), Bytes{0});
+  EXPECT_EQ(number(0x1003, 0), 1U);
+  EXPECT_EQ(expedited(0x1003, 0, 1, 1), co::abort::value);
+  EXPECT_EQ(expedited(0x1003, 1, 0, 4), co::abort::read_only);
+  EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);
+  EXPECT_EQ(number(0x1003, 0), 0U);
+  EXPECT_EQ(code(ask(head(0x40, 0x1003, 1))), co::abort::no_data);
+  EXPECT_EQ(code(ask(head(0x40, 0x1003, 9))), co::abort::no_sub_index);
+
+  // A trial that nobody confirms: the fault is there while EMCY is off, then it is told; stopped nodes say nothing.
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000085U, 4), 0U);
+  download(co::image, 1, make_image(arm.robot, 6));
+  command(Command::commit_trial, 1);
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(told(), Bytes());
+  EXPECT_EQ(upload(0x1001, 0), Bytes{1});
+  EXPECT_EQ(number(0x1003, 1), static_cast<std::uint32_t>(ec::trial_reverted | trial_reverted << 16));
+  const std::uint8_t stop[2] = {2, 0};
+  const std::uint8_t start[2] = {1, 0};
+  EXPECT_EQ(expedited(0x1014, 0, 0x85, 4), 0U);
+  node.receive(0, stop, 2);
+  EXPECT_EQ(told(1000), Bytes());
+  node.receive(0, start, 2);
+  full = true;
+  EXPECT_EQ(told(1000), Bytes()) << "no room";
+  full = false;
+  EXPECT_EQ(told(), emcy(ec::trial_reverted, trial_reverted));
+  EXPECT_EQ(told(1000), Bytes());
+  // After a reset what is there is told again, and is no new entry of the history.
+  const std::uint8_t reset[2] = {129, node_id};
+  node.receive(0, reset, 2);
+  EXPECT_EQ(told(), emcy(ec::trial_reverted, trial_reverted));
+  EXPECT_EQ(number(0x1003, 0), 1U);
+}
+
+TEST_F(Canopen, EmergencyIdentifierAndInhibitTime) {
+  EXPECT_EQ(number(0x1014, 0), 0x85U);
+  EXPECT_EQ(number(0x1015, 0), 1000U);
+  EXPECT_EQ(expedited(0x1014, 0, 0x86, 4), co::abort::value) << "while there is one";
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000086U, 4), co::abort::value);
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000085U, 4), 0U);
+  EXPECT_EQ(expedited(0x1014, 0, 0xA0000085U, 4), co::abort::value) << "29 bits";
+  EXPECT_EQ(expedited(0x1014, 0, 0xC0000085U, 4), co::abort::value) << "reserved";
+  for (const std::uint32_t id :
+       {0x000U, 0x07FU, 0x101U, 0x180U, 0x581U, 0x5FFU, 0x601U, 0x67FU, 0x6E0U, 0x6FFU, 0x701U, 0x7FFU}) {
+    EXPECT_EQ(expedited(0x1014, 0, id, 4), co::abort::value) << id;
+  }
+  EXPECT_EQ(expedited(0x1014, 0, 0x123456, 4), co::abort::value);
+  EXPECT_EQ(expedited(0x1014, 0, 0x0FE, 4), 0U);
+  EXPECT_EQ(number(0x1014, 0), 0x0FEU);
+  const std::uint8_t reset[2] = {130, node_id};
+  node.receive(0, reset, 2);
+  poll(1);
+  EXPECT_EQ(number(0x1014, 0), 0x85U) << "back to its value at power-on";
+
+  // Faults that flap are told with the inhibit time between: once raised, once gone, and what is there in between.
+  EXPECT_EQ(expedited(0x1015, 0, 500, 2), 0U);
+  const Bytes image = make_image(arm.robot, 5);
+  emergencies.clear();
+  std::uint32_t start_ms = arm.now_ms;
+  for (std::uint32_t k = 0; k < 40; ++k) {
+    arm.push(make_image(arm.robot, 5 + k));
+    node.poll(arm.now_ms);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    node.poll(arm.now_ms);
+  }
+  EXPECT_LE(emergencies.size(), 2 + (arm.now_ms - start_ms) / 50);
+  EXPECT_EQ(number(0x1003, 0), 1U) << "one entry";
+  // Without it each change is told.
+  EXPECT_EQ(expedited(0x1015, 0, 0, 2), 0U);
+  poll(1000);
+  poll(1000);
+  emergencies.clear();
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    arm.push(make_image(arm.robot, 5 + k));
+    node.poll(arm.now_ms);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    node.poll(arm.now_ms);
+  }
+  EXPECT_EQ(emergencies.size(), 8U);
+}
+
+TEST_F(Canopen, TheErrorHistoryKeepsTheNewest) {
+  // Two faults by turns: a trial that reverts, and no set at all.
+  EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);
+  for (std::uint32_t k = 0; k < 6; ++k) {
+    ASSERT_EQ(arm.push(make_image(arm.robot, 1 + 2 * k)), Answer::accepted) << k;
+    node.poll(arm.now_ms);
+    ASSERT_EQ(arm.stage(make_image(arm.robot, 2 + 2 * k), 1), Answer::accepted);
+    arm.run(Command::commit_trial, 1, 1);
+    for (int n = 0; n < 200; ++n) poll(1);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    poll(1);
+  }
+  EXPECT_EQ(number(0x1003, 0), 8U);
+  const std::uint32_t newest = number(0x1003, 1);
+  EXPECT_EQ(newest & 0xFFFFU, co::emergency_code::no_valid_set);
+  EXPECT_EQ(number(0x1003, 2) & 0xFFFFU, co::emergency_code::trial_reverted);
+  EXPECT_EQ(number(0x1003, 7), newest);
+}
+
 TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
   ask(head(0x21, co::image, 1, 100));
   ask(Frame{0x00});
@@ -494,6 +637,8 @@ TEST_F(Canopen, SurvivesMillionsOfBytes) {
       node.receive(co::sdo_request_id + node_id, f.data(), 8);
     }
     ASSERT_LE(sent.size(), 3U + CanopenNode::segments_per_call);
+    ASSERT_LE(emergencies.size(), 1U);
+    emergencies.clear();
     if (k % 16 == 0) poll(random() % 50);
   }
   EXPECT_FALSE(arm.flash.double_writes);

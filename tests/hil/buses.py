@@ -507,7 +507,10 @@ def image_in(frames):
 
 def judge_candump(frames, image):
     known = {0x600 + NODE, 0x580 + NODE, 0x700 + NODE}
-    check({number for number, _ in frames} == known, "requests, answers and heartbeats are on the bus", known)
+    seen = {number for number, _ in frames}
+    check(known <= seen <= known | {0x080 + NODE}, "requests, answers, heartbeats and EMCY are on the bus", seen)
+    emergencies = [data for number, data in frames if number == 0x080 + NODE]
+    check(emergencies == [bytes(8)], "one EMCY: with the first set the fault that there is none has gone", emergencies)
     received, answers = image_in(frames)
     check(received == image, "candump's frames hold the image")
     passed(f"can: candump of a push: {len(frames)} frames, {answers} answers, the image is in them byte for byte")

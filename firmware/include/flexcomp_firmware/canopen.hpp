@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// CANopen node to CiA 301: NMT slave, boot-up, heartbeat producer and one SDO server (expedited, segmented
+/// CANopen node to CiA 301: NMT slave, boot-up, heartbeat and EMCY producer and one SDO server (expedited, segmented
 /// and in blocks) with the object dictionary of canopen_objects.hpp. Frames come and go through callbacks; no I/O
 /// in here.
 #ifndef FLEXCOMP_FIRMWARE_CANOPEN_HPP
@@ -65,6 +65,9 @@ class CanopenNode {
 
   void nmt(std::uint8_t command);
   void reset();
+  void observe_faults();
+  void send_emergency(std::uint32_t now_ms);
+  std::uint32_t set_emergency_id(std::uint32_t id);
   void request(const std::uint8_t* frame);
   void begin_download(const std::uint8_t* frame);
   void download_segment(const std::uint8_t* frame);
@@ -108,6 +111,15 @@ class CanopenNode {
   std::uint32_t touched_ms_ = 0;
   std::uint32_t heartbeat_ms_ = 0;  ///< when the last one was sent
   std::uint16_t heartbeat_time_ = 0;
+
+  std::uint16_t faults_seen_ = 0;  ///< that are in the history
+  std::uint16_t faults_told_ = 0;  ///< by EMCY, since the last reset
+  bool inhibited_ = false;         ///< since emergency_ms_
+  std::uint32_t emergency_ms_ = 0;
+  std::uint32_t emergency_id_ = 0;
+  std::uint16_t emergency_inhibit_ = 0;
+  std::uint8_t history_size_ = 0;
+  std::array<std::uint32_t, wire::canopen::history_length> history_{};
 
   Transfer transfer_ = Transfer::none;
   std::uint16_t index_ = 0;

@@ -72,13 +72,16 @@ def first_words(work):
     end = time.monotonic() + PATIENCE
     while True:
         frames = [line.split()[2] for line in read(f"{work}/frames.log", "r").splitlines() if line.count(" ") == 2]
+        emergencies = [frame for frame in frames if frame.startswith(f"{0x080 + NODE:03X}#")]
+        frames = [frame for frame in frames if frame not in emergencies]
         if len(frames) >= 2:
             break
         check(time.monotonic() < end, "a heartbeat follows the boot-up message", *frames)
         time.sleep(0.1)
     check(frames[0] == f"{HEARTBEAT:03X}#00", "the first frame is the boot-up message", *frames[:5])
     check(frames[1] == f"{HEARTBEAT:03X}#7F", "then the node is pre-operational", *frames[:5])
-    passed("boot-up message, then the heartbeat of a pre-operational node (candump)")
+    check(emergencies[:1] == [f"{0x080 + NODE:03X}#0163010100000000"], "EMCY tells that there is no set", emergencies)
+    passed("boot-up message, EMCY without a set, then the heartbeat of a pre-operational node (candump)")
 
 
 def network_management(bench, bus):
