@@ -81,6 +81,7 @@ void CanopenNode::reset() {
   inhibited_ = false;
   emergency_id_ = co::emergency_id + static_cast<std::uint32_t>(settings_.node);
   emergency_inhibit_ = co::emergency_inhibit_default;
+  load_communication();
   state_ = co::NmtState::initialising;
   boot_up_ = true;
 }
@@ -189,6 +190,36 @@ void CanopenNode::poll(std::uint32_t now_ms) {
     if (transfer_ != Transfer::none) abort(co::abort::timeout);
     repeatable_ = Transfer::none;
   }
+}
+
+// --- communication parameters -------------------------------------------------------------------------
+
+void CanopenNode::set_memory(const CanMemory& memory) {
+  memory_ = memory;
+  load_communication();
+}
+
+/// Takes 0x1015 and 0x1017 from the memory, where it holds a whole record.
+void CanopenNode::load_communication() {
+  if (memory_.load == nullptr || memory_.save == nullptr) return;
+  std::uint8_t record[co::communication_bytes] = {};
+  if (memory_.load(memory_.user, record) == 0) return;
+  if (record[0] != 1 || record[1] != 0 || co::crc16(0, record, 6) != load_u16(record + 6)) return;
+  heartbeat_time_ = load_u16(record + 2);
+  emergency_inhibit_ = load_u16(record + 4);
+}
+
+/// Abort code of writing 0x1010:2 or, where the defaults are wanted, 0x1011:2. A record of version 0 holds nothing.
+std::uint32_t CanopenNode::save_communication(bool defaults) {
+  if (memory_.load == nullptr || memory_.save == nullptr) return co::abort::access;
+  std::uint8_t record[co::communication_bytes] = {};
+  if (!defaults) {
+    record[0] = 1;
+    store_u16(record + 2, heartbeat_time_);
+    store_u16(record + 4, emergency_inhibit_);
+    store_u16(record + 6, co::crc16(0, record, 6));
+  }
+  return memory_.save(memory_.user, record) != 0 ? co::abort::none : co::abort::hardware;
 }
 
 // --- emergencies --------------------------------------------------------------------------------------
@@ -872,9 +903,11 @@ std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
   switch (index_) {
     case co::store_parameters:
       if (load_u32(bytes) != co::save_signature) return co::abort::not_stored;
+      if (sub_ == co::communication_parameters) return save_communication(false);
       return command(wire::Command::commit, 0);
     case co::restore_parameters:
       if (load_u32(bytes) != co::load_signature) return co::abort::not_stored;
+      if (sub_ == co::communication_parameters) return save_communication(true);
       return command(wire::Command::restore_defaults, 0);
     case co::error_history:
       if (bytes[0] != 0) return co::abort::value;
@@ -939,7 +972,10 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
     }
     case co::store_parameters:
     case co::restore_parameters:
-      number = 1;  // sub 0: one sub-index; sub 1: on command
+      // Sub 0: two sub-indices; sub 1 and 2: on command.
+      number = sub_ == 0 ? 2U : 1U;
+      if (sub_ == co::communication_parameters && (memory_.load == nullptr || memory_.save == nullptr))
+        number = 0;
       break;
     case co::heartbeat_time:
       number = heartbeat_time_;

@@ -444,6 +444,97 @@ TEST_F(Canopen, EmergencyIdentifierAndInhibitTime) {
   EXPECT_EQ(emergencies.size(), 8U);
 }
 
+/// 8 bytes that may fail.
+struct CanBytes {
+  std::optional<Bytes> bytes;
+  bool fails = false;
+  CanMemory memory() {
+    return {this,
+            [](void* self, std::uint8_t* to) {
+              const auto& m = *static_cast<CanBytes*>(self);
+              if (m.bytes) std::copy(m.bytes->begin(), m.bytes->end(), to);
+              return m.bytes ? 1 : 0;
+            },
+            [](void* self, const std::uint8_t* from) {
+              auto& m = *static_cast<CanBytes*>(self);
+              if (m.fails) return 0;
+              m.bytes = Bytes(from, from + 8);
+              return 1;
+            }};
+  }
+};
+
+TEST_F(Canopen, CommunicationParametersAreStoredWhereThereIsMemory) {
+  const auto reset = [this](std::uint8_t how) {
+    const std::uint8_t nmt[2] = {how, node_id};
+    node.receive(0, nmt, 2);
+    poll(1);
+  };
+  EXPECT_EQ(number(0x1010, 0), 2U);
+  EXPECT_EQ(number(0x1011, 0), 2U);
+  EXPECT_EQ(number(0x1010, 2), 0U) << "no memory";
+  EXPECT_EQ(number(0x1011, 2), 0U);
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), co::abort::access);
+  EXPECT_EQ(expedited(0x1011, 2, co::load_signature, 4), co::abort::access);
+  EXPECT_EQ(expedited(0x1010, 2, 1, 4), co::abort::not_stored);
+
+  CanBytes kept;
+  node.set_memory(kept.memory());
+  EXPECT_EQ(number(0x1017, 0), 100U) << "an empty memory";
+  EXPECT_EQ(number(0x1010, 2), 1U);
+  EXPECT_EQ(number(0x1011, 2), 1U);
+  EXPECT_EQ(expedited(0x1010, 2, co::load_signature, 4), co::abort::not_stored);
+  expedited(0x1017, 0, 250, 2);
+  expedited(0x1015, 0, 300, 2);
+  reset(130);
+  EXPECT_EQ(number(0x1017, 0), 100U) << "not saved";
+  expedited(0x1017, 0, 250, 2);
+  expedited(0x1015, 0, 300, 2);
+  kept.fails = true;
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), co::abort::hardware);
+  EXPECT_FALSE(kept.bytes);
+  kept.fails = false;
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), 0U);
+  EXPECT_EQ(arm.sequence(), 0U) << "no set is committed by it";
+  expedited(0x1017, 0, 400, 2);
+  for (const std::uint8_t how : {std::uint8_t{129}, std::uint8_t{130}}) {
+    reset(how);
+    EXPECT_EQ(number(0x1017, 0), 250U);
+    EXPECT_EQ(number(0x1015, 0), 300U);
+  }
+  // Another node that starts with this memory; a damaged record is none.
+  const Bytes good = *kept.bytes;
+  const auto started = [&] {
+    std::vector<Sent> answers;
+    CanopenNode other(*arm.device, 2, {node_id, 100, 2000},
+                      {&answers, [](void* self, std::uint16_t id, const std::uint8_t* b, std::uint8_t n) {
+                         static_cast<std::vector<Sent>*>(self)->push_back({id, Bytes(b, b + n)});
+                         return true;
+                       }});
+    other.set_memory(kept.memory());
+    other.poll(0);
+    const Frame f = head(0x40, 0x1017, 0);
+    other.receive(co::sdo_request_id + node_id, f.data(), 8);
+    return answers.empty() ? 0 : load_u16(answers.back().bytes.data() + 4);
+  };
+  EXPECT_EQ(started(), 250);
+  for (unsigned bit = 0; bit < 64; ++bit) {
+    kept.bytes = good;
+    (*kept.bytes)[bit / 8] = static_cast<std::uint8_t>((*kept.bytes)[bit / 8] ^ (1U << bit % 8));
+    EXPECT_EQ(started(), 100) << bit;
+  }
+  for (const std::uint8_t blank : {std::uint8_t{0}, std::uint8_t{0xFF}}) {
+    kept.bytes = Bytes(8, blank);
+    EXPECT_EQ(started(), 100);
+  }
+  kept.bytes = good;
+  EXPECT_EQ(expedited(0x1011, 2, co::load_signature, 4), 0U);
+  EXPECT_EQ(number(0x1017, 0), 250U) << "from the next reset on";
+  reset(129);
+  EXPECT_EQ(number(0x1017, 0), 100U);
+  EXPECT_EQ(number(0x1015, 0), 1000U);
+}
+
 TEST_F(Canopen, TheErrorHistoryKeepsTheNewest) {
   // Two faults by turns: a trial that reverts, and no set at all.
   EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);

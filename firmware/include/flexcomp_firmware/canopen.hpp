@@ -24,6 +24,15 @@ struct CanTransmit {
   bool (*send)(void* user, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) = nullptr;
 };
 
+/// Non-volatile memory of wire::canopen::communication_bytes bytes for the communication parameters of a node; optional.
+struct CanMemory {
+  void* user = nullptr;  ///< given to both
+  /// Copies the bytes that were saved; 0 where there are none.
+  int (*load)(void* user, std::uint8_t* to) = nullptr;
+  /// Keeps these bytes; 0 where that failed.
+  int (*save)(void* user, const std::uint8_t* from) = nullptr;
+};
+
 /// Settings of a node.
 struct CanopenSettings {
   std::uint8_t node = 1;                ///< 1 … 127
@@ -50,6 +59,9 @@ class CanopenNode {
   /// ends timed-out transfers. now_ms wraps.
   void poll(std::uint32_t now_ms);
 
+  /// Memory of the communication parameters; those that it holds take effect at once. Before the first poll().
+  void set_memory(const CanMemory& memory);
+
   /// CanopenSettings::block_size of the downloads that begin from now on.
   void set_block_size(std::uint8_t segments) { settings_.block_size = segments; }
 
@@ -65,6 +77,8 @@ class CanopenNode {
 
   void nmt(std::uint8_t command);
   void reset();
+  void load_communication();
+  std::uint32_t save_communication(bool defaults);
   void observe_faults();
   void send_emergency(std::uint32_t now_ms);
   std::uint32_t set_emergency_id(std::uint32_t id);
@@ -105,6 +119,7 @@ class CanopenNode {
   const Origin origin_;
   CanopenSettings settings_;
   const CanTransmit transmit_;
+  CanMemory memory_{};
   wire::canopen::NmtState state_ = wire::canopen::NmtState::initialising;
   bool boot_up_ = true;
   bool touched_ = false;

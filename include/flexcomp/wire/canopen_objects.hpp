@@ -10,10 +10,12 @@
 ///            1-8  UNSIGNED32      ro      newest first: EMCY error code, faults of the status record << 16
 ///     0x1008   0  VISIBLE_STRING  const   manufacturer device name, "flexcomp"
 ///     0x100A   0  VISIBLE_STRING  const   manufacturer software version
-///     0x1010   0  UNSIGNED8       const   1
+///     0x1010   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      "save" (0x65766173): commit what is staged; reads 1
-///     0x1011   0  UNSIGNED8       const   1
+///              2  UNSIGNED32      rw      "save": stores 0x1015 and 0x1017; reads 1, or 0 without memory for them
+///     0x1011   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      "load" (0x64616F6C): restore_defaults; reads 1
+///              2  UNSIGNED32      rw      "load": 0x1015 and 0x1017 as built, from the next reset on; reads as 0x1010:2
 ///     0x1014   0  UNSIGNED32      rw      COB-ID of EMCY, 0x80 + node; bit 31: none is sent
 ///     0x1015   0  UNSIGNED16      rw      between two of them at least, 100 us
 ///     0x1017   0  UNSIGNED16      rw      producer heartbeat time, ms; 0: none
@@ -62,6 +64,9 @@
 ///   out in the background (verify, commit and so on) is only there: poll 0x2002:1 until it is not 3.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by a bounded motion,
 ///   because between the two a controller would run a set that it can no longer read back.
+/// - Communication parameters have 8 bytes of memory of their own, where the integrator gives it: version 1 u8, 0 u8,
+///   0x1017 u16, 0x1015 u16, CRC-16 of these 6 bytes. They hold from the next reset on. 0x1010:1 does not store them: a
+///   set is committed without a word on the network, and the other way round.
 /// - EMCY (CiA 301, 7.2.7) is sent for each fault that appears, and with 0000h for those that disappear, in pre-operational and
 ///   operational; after a reset for those that are there. Bytes: error code u16, error register u8, faults of the
 ///   status record u16, refusal of the last command u16, 0.
@@ -91,6 +96,8 @@ constexpr std::uint16_t store_parameters = 0x1010;    ///< CiA 301, 7.5.2.13
 constexpr std::uint16_t restore_parameters = 0x1011;  ///< CiA 301, 7.5.2.14
 constexpr std::uint16_t emergency = 0x1014;           ///< COB-ID, CiA 301, 7.5.2.17
 constexpr std::uint16_t emergency_inhibit = 0x1015;   ///< CiA 301, 7.5.2.18
+constexpr std::uint8_t communication_parameters = 2;  ///< sub-index of the two: 0x1015 and 0x1017
+constexpr std::uint32_t communication_bytes = 8;      ///< of their memory
 constexpr std::uint16_t heartbeat_time = 0x1017;      ///< CiA 301, 7.5.2.20
 constexpr std::uint16_t identity = 0x1018;            ///< CiA 301, 7.5.2.21
 constexpr std::uint16_t sdo_server = 0x1200;          ///< CiA 301, 7.5.2.33
@@ -182,6 +189,7 @@ constexpr std::uint32_t block_size = 0x05040002;      ///< invalid block size
 constexpr std::uint32_t sequence = 0x05040003;        ///< invalid sequence number, of a block
 constexpr std::uint32_t crc = 0x05040004;             ///< CRC error, of a block transfer
 constexpr std::uint32_t out_of_memory = 0x05040005;   ///< out of memory
+constexpr std::uint32_t access = 0x06010000;          ///< unsupported access to an object
 constexpr std::uint32_t write_only = 0x06010001;      ///< attempt to read a write-only object
 constexpr std::uint32_t read_only = 0x06010002;       ///< attempt to write a read-only object
 constexpr std::uint32_t no_object = 0x06020000;       ///< object does not exist
