@@ -557,7 +557,7 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
                                 uint16_t heartbeat_ms, flexcomp_can_send send, void* user);
 /** Takes a data frame with an 11-bit identifier from the bus; any may be given, and those of other nodes are
  * ignored. Not from the receive interrupt, if that may hold up the cycle: put frames into a queue there.
- * BACKGROUND; small and one frame sent, but for the frame that
+ * BACKGROUND; small and one frame sent, of a block upload eight, but for the frame that
  *   begins an image (clears FLEXCOMP_STAGING_BYTES),
  *   reads one (one `read` of up to 576 bytes),
  *   ends a probe (two steps),
@@ -565,8 +565,23 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
  *   rolls back (one `read`, and a check). */
 void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, size_t size);
 /** Background work of a node: boot-up, heartbeat, timeouts, frames that could not be sent. Every few
- * milliseconds. BACKGROUND; small, at most three frames sent. */
+ * milliseconds. BACKGROUND; small, at most twelve frames sent (eight are segments of a block upload, which
+ * pauses while the queue is full). */
 void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms);
+/** Copies the 8 bytes that were saved at last to `bytes`; 0 where there are none. */
+typedef int (*flexcomp_can_load)(void* user, uint8_t* bytes);
+/** Keeps 8 bytes in non-volatile memory; 0 where that failed. Called within flexcomp_can_receive, which waits for
+ * it. */
+typedef int (*flexcomp_can_save)(void* user, const uint8_t* bytes);
+/** Memory for what the network has set up: heartbeat time (1017h) and inhibit time of EMCY (1015h), saved by
+ * 1010h:2 and set back by 1011h:2. Before the first flexcomp_can_poll; what was saved holds at once, and after
+ * each reset by the network. Without it both are as built after each reset, and 1010h:2 is refused (0601 0000h).
+ * BACKGROUND; calls `load`. */
+void flexcomp_can_set_memory(flexcomp_can* can, flexcomp_can_load load, flexcomp_can_save save, void* user);
+/** Frames of an image that a client may send without an answer (SDO block download), 3 ... 63; 63 without this
+ * call. Not more than your receive queue holds: what it loses is sent again, which takes time. 0: no block
+ * transfers, which doubles the bus load of a push. BACKGROUND; small, no hook. */
+void flexcomp_can_set_block_size(flexcomp_can* can, unsigned frames);
 
 /* --- Modbus -------------------------------------------------------------------------------------- */
 

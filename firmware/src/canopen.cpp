@@ -57,6 +57,8 @@ constexpr unsigned begin_download = 1;
 constexpr unsigned begin_upload = 2;
 constexpr unsigned upload_segment = 3;
 constexpr unsigned abort = 4;
+constexpr unsigned block_upload = 5;
+constexpr unsigned block_download = 6;
 }  // namespace request_specifier
 
 constexpr std::uint8_t toggle_bit = 0x10;
@@ -75,6 +77,11 @@ void CanopenNode::reset() {
   argument_ = 0;
   command_ = 0;
   heartbeat_time_ = settings_.heartbeat_ms;
+  faults_told_ = 0;
+  inhibited_ = false;
+  emergency_id_ = co::emergency_id + static_cast<std::uint32_t>(settings_.node);
+  emergency_inhibit_ = co::emergency_inhibit_default;
+  load_communication();
   state_ = co::NmtState::initialising;
   boot_up_ = true;
 }
@@ -87,7 +94,8 @@ bool CanopenNode::staging() const { return index_ == co::image && sub_ == co::im
 
 /// Ends the transfer and discards what it has staged.
 void CanopenNode::forget() {
-  if (transfer_ == Transfer::download && staging()) device_.store().disconnect(origin_);
+  const bool downloads = transfer_ == Transfer::download || transfer_ == Transfer::block_download;
+  if (downloads && staging()) device_.store().disconnect(origin_);
   transfer_ = Transfer::none;
   repeatable_ = Transfer::none;
 }
@@ -99,12 +107,25 @@ void CanopenNode::reply(const std::uint8_t* frame) {
 }
 
 void CanopenNode::abort(std::uint32_t code) {
+  const bool in_sub_block = transfer_ == Transfer::block_download && block_ == Block::segments;
+  leftover_ = sequence_;
+  leftovers_ = in_sub_block ? block_size_ : std::uint8_t{0};
   forget();
   std::uint8_t frame[8] = {0x80};
   store_u16(frame + 1, index_);
   frame[3] = sub_;
   store_u32(frame + 4, code);
   reply(frame);
+}
+
+/// Answers what only fits another transfer than the one that runs. Where none does, it is about no object: a client that
+/// begins the next one must not take it for the answer.
+void CanopenNode::abort_without_transfer() {
+  if (transfer_ == Transfer::none) {
+    index_ = 0;
+    sub_ = 0;
+  }
+  abort(co::abort::command);
 }
 
 // --- network management -------------------------------------------------------------------------------
@@ -150,6 +171,7 @@ void CanopenNode::poll(std::uint32_t now_ms) {
     const std::uint16_t id = static_cast<std::uint16_t>(co::sdo_answer_id + settings_.node);
     pending_ = transmit_.send == nullptr || !transmit_.send(transmit_.user, id, out_.data(), 8);
   }
+  send_segments();
   const std::uint16_t heartbeat = static_cast<std::uint16_t>(co::heartbeat_id + settings_.node);
   if (boot_up_) {
     const std::uint8_t boot[1] = {static_cast<std::uint8_t>(co::NmtState::initialising)};
@@ -162,10 +184,119 @@ void CanopenNode::poll(std::uint32_t now_ms) {
     if (transmit_.send != nullptr && transmit_.send(transmit_.user, heartbeat, beat, 1))
       heartbeat_ms_ = now_ms;
   }
+  observe_faults();
+  send_emergency(now_ms);
   if (now_ms - touched_ms_ >= settings_.sdo_timeout_ms) {
     if (transfer_ != Transfer::none) abort(co::abort::timeout);
     repeatable_ = Transfer::none;
   }
+}
+
+// --- communication parameters -------------------------------------------------------------------------
+
+void CanopenNode::set_memory(const CanMemory& memory) {
+  memory_ = memory;
+  load_communication();
+}
+
+/// Takes 0x1015 and 0x1017 from the memory, where it holds a whole record.
+void CanopenNode::load_communication() {
+  if (memory_.load == nullptr || memory_.save == nullptr) return;
+  std::uint8_t record[co::communication_bytes] = {};
+  if (memory_.load(memory_.user, record) == 0) return;
+  if (record[0] != 1 || record[1] != 0 || co::crc16(0, record, 6) != load_u16(record + 6)) return;
+  heartbeat_time_ = load_u16(record + 2);
+  emergency_inhibit_ = load_u16(record + 4);
+}
+
+/// Abort code of writing 0x1010:2 or, where the defaults are wanted, 0x1011:2. A record of version 0 holds nothing.
+std::uint32_t CanopenNode::save_communication(bool defaults) {
+  if (memory_.load == nullptr || memory_.save == nullptr) return co::abort::access;
+  std::uint8_t record[co::communication_bytes] = {};
+  if (!defaults) {
+    record[0] = 1;
+    store_u16(record + 2, heartbeat_time_);
+    store_u16(record + 4, emergency_inhibit_);
+    store_u16(record + 6, co::crc16(0, record, 6));
+  }
+  return memory_.save(memory_.user, record) != 0 ? co::abort::none : co::abort::hardware;
+}
+
+// --- emergencies --------------------------------------------------------------------------------------
+
+namespace {
+
+struct FaultCode {
+  std::uint16_t fault;
+  std::uint16_t code;
+};
+
+constexpr FaultCode fault_codes[] = {
+    {wire::fault::storage, co::emergency_code::storage},
+    {wire::fault::no_valid_set, co::emergency_code::no_valid_set},
+    {wire::fault::older_slot, co::emergency_code::older_slot},
+    {wire::fault::trial_reverted, co::emergency_code::trial_reverted},
+};
+
+}  // namespace
+
+/// Puts new faults into 0x1003. One that comes and goes again and again takes one entry.
+void CanopenNode::observe_faults() {
+  const std::uint16_t faults = device_.store().faults();
+  for (const FaultCode& f : fault_codes) {
+    if ((faults & f.fault) == 0 || (faults_seen_ & f.fault) != 0) continue;
+    const std::uint32_t entry = f.code | static_cast<std::uint32_t>(faults) << 16U;
+    if (history_size_ != 0 && history_[0] == entry) continue;
+    if (history_size_ < history_.size()) ++history_size_;
+    for (std::size_t k = history_size_ - 1U; k > 0; --k) history_[k] = history_[k - 1];
+    history_[0] = entry;
+  }
+  faults_seen_ = faults;
+}
+
+/// Sends the EMCY that is due, at most one: a fault that nobody was told of, or that some have disappeared.
+void CanopenNode::send_emergency(std::uint32_t now_ms) {
+  if (inhibited_ && now_ms - emergency_ms_ < (emergency_inhibit_ + 9U) / 10U) return;
+  inhibited_ = false;
+  if (state_ != co::NmtState::pre_operational && state_ != co::NmtState::operational) return;
+  if ((emergency_id_ & co::emergency_off) != 0) return;
+  const std::uint16_t faults = device_.store().faults();
+  std::uint16_t told = faults_told_;
+  std::uint16_t code = co::emergency_code::none;
+  if ((told & ~faults) != 0) {
+    told = told & faults;
+  } else {
+    for (const FaultCode& f : fault_codes) {
+      if ((faults & ~told & f.fault) == 0) continue;
+      code = f.code;
+      told = told | f.fault;
+      break;
+    }
+  }
+  if (told == faults_told_) return;
+  wire::Status status;
+  device_.store().status(status);
+  std::uint8_t frame[8] = {};
+  store_u16(frame, code);
+  frame[2] = faults != 0 ? 1 : 0;
+  store_u16(frame + 3, faults);
+  store_u16(frame + 5, status.refusal);
+  const std::uint16_t id = static_cast<std::uint16_t>(emergency_id_);
+  if (transmit_.send == nullptr || !transmit_.send(transmit_.user, id, frame, 8)) return;
+  faults_told_ = told;
+  emergency_ms_ = now_ms;
+  inhibited_ = emergency_inhibit_ != 0;
+}
+
+/// Writes 0x1014: bits of the identifier change only while EMCY is off (CiA 301, 7.5.2.17).
+std::uint32_t CanopenNode::set_emergency_id(std::uint32_t id) {
+  constexpr std::uint32_t identifier = 0x7FF;
+  if ((id & ~(co::emergency_off | identifier)) != 0 || co::is_restricted(id & identifier))
+    return co::abort::value;
+  const bool same = ((id ^ emergency_id_) & identifier) == 0;
+  if (!same && (emergency_id_ & co::emergency_off) == 0) return co::abort::value;
+  emergency_id_ = id;
+  return co::abort::none;
 }
 
 // --- SDO server ---------------------------------------------------------------------------------------
@@ -202,6 +333,11 @@ void CanopenNode::request(const std::uint8_t* frame) {
     upload_beside(frame);
     return;
   }
+  if (is_block_segment(frame)) {
+    block_segment(frame);
+    return;
+  }
+  if (is_leftover(frame)) return;
   touched_ = true;
   switch (frame[0] >> 5U) {
     case request_specifier::download_segment:
@@ -221,13 +357,26 @@ void CanopenNode::request(const std::uint8_t* frame) {
     case request_specifier::abort:
       forget();
       return;
+    case request_specifier::block_download:
+      if (settings_.block_size == 0) break;
+      if ((frame[0] & 1U) == 0) {
+        begin_block_download(frame);
+      } else {
+        end_block_download(frame);
+      }
+      return;
+    case request_specifier::block_upload:
+      if (settings_.block_size == 0) break;
+      block_upload(frame);
+      return;
     default:
-      // Block transfer and unknown specifiers. The abort repeats the client's multiplexor.
-      forget();
-      index_ = load_u16(frame + 1);
-      sub_ = frame[3];
-      abort(co::abort::command);
+      break;
   }
+  // What is not served. The abort repeats the client's multiplexor.
+  forget();
+  index_ = load_u16(frame + 1);
+  sub_ = frame[3];
+  abort(co::abort::command);
 }
 
 /// Abort code of a download of this size to the object, `none` where it is accepted.
@@ -331,7 +480,7 @@ void CanopenNode::download_segment(const std::uint8_t* frame) {
     return;
   }
   if (transfer_ != Transfer::download) {
-    abort(co::abort::command);
+    abort_without_transfer();
     return;
   }
   if (((frame[0] & toggle_bit) != 0) != toggle_) {
@@ -352,17 +501,37 @@ void CanopenNode::download_segment(const std::uint8_t* frame) {
   reply(answer);
 }
 
+/// Abort code of an upload of the selected object; where it is `none`, its size, and its value in scratch_ unless it is
+/// the image.
+std::uint32_t CanopenNode::start_upload(std::uint32_t& size) {
+  std::uint32_t code = co::abort::none;
+  const Entry* entry = find(index_, sub_, code);
+  if (entry == nullptr) return code;
+  if (entry->access == Access::wo) return co::abort::write_only;
+  return get(size, scratch_.data());
+}
+
+/// Copies bytes of the object that is uploaded. False where the active set has changed since the upload began: the segments
+/// would mix two images.
+bool CanopenNode::read_segment(std::uint32_t offset, std::uint8_t* to, std::uint32_t size) {
+  if (index_ != co::image) {
+    std::memcpy(to, scratch_.data() + offset, size);
+    return true;
+  }
+  wire::Status status;
+  device_.store().status(status);
+  return status.active_crc == image_crc_ && status.active_bytes == size_ &&
+         device_.store().read_active(offset, to, size);
+}
+
 // Initiate upload.
 //   request   byte 0: 010 00000      1-2: index   3: sub-index   4-7: 0
 //   response  byte 0: 010 0 nn e s   1-2: index   3: sub-index   4-7: data (e) or size (s)
 void CanopenNode::begin_upload(const std::uint8_t* frame) {
   index_ = load_u16(frame + 1);
   sub_ = frame[3];
-  std::uint32_t code = co::abort::none;
-  const Entry* entry = find(index_, sub_, code);
-  if (entry != nullptr && entry->access == Access::wo) code = co::abort::write_only;
   std::uint32_t size = 0;
-  if (code == co::abort::none) code = get(size, scratch_.data());
+  const std::uint32_t code = start_upload(size);
   if (code != co::abort::none) {
     abort(code);
     return;
@@ -393,7 +562,7 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
     return;
   }
   if (transfer_ != Transfer::upload) {
-    abort(co::abort::command);
+    abort_without_transfer();
     return;
   }
   if (((frame[0] & toggle_bit) != 0) != toggle_) {
@@ -402,17 +571,9 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
   }
   std::uint8_t answer[8] = {};
   const std::uint32_t n = size_ - done_ < 7 ? size_ - done_ : 7;
-  if (index_ == co::image) {
-    // If the active set has changed since, the segments would mix two images.
-    wire::Status status;
-    device_.store().status(status);
-    if (status.active_crc != image_crc_ || status.active_bytes != size_ ||
-        !device_.store().read_active(done_, answer + 1, n)) {
-      abort(co::abort::device_state);
-      return;
-    }
-  } else {
-    std::memcpy(answer + 1, scratch_.data() + done_, n);
+  if (!read_segment(done_, answer + 1, n)) {
+    abort(co::abort::device_state);
+    return;
   }
   done_ += n;
   const bool last = done_ == size_;
@@ -421,6 +582,313 @@ void CanopenNode::upload_segment(const std::uint8_t* frame) {
   if (last) transfer_ = Transfer::none;
   repeatable_ = Transfer::upload;
   std::memcpy(segment_.data(), answer, segment_.size());
+  reply(answer);
+}
+
+// --- SDO blocks ---------------------------------------------------------------------------------------
+
+namespace {
+
+/// Sub-commands of a block transfer, bits 1 … 0 of the first byte.
+constexpr std::uint8_t block_subcommand = 3;
+constexpr std::uint8_t block_initiate = 0;
+constexpr std::uint8_t block_ended = 1;
+constexpr std::uint8_t block_taken = 2;
+
+constexpr std::uint8_t last_of_block = 0x80;
+constexpr std::uint8_t segment_number = 0x7F;
+
+/// Segments of a sub-block of a download: it alternates with one less, which must not be one.
+std::uint8_t segments_taken(const CanopenSettings& settings) {
+  if (settings.block_size > co::most_segments) return co::most_segments;
+  return settings.block_size < 3 ? std::uint8_t{3} : settings.block_size;
+}
+
+/// Whether a request starts the block upload of an object that there is. Its first byte could also be that of the last
+/// segment of a download, number 32 or 36; three more bytes would have to name an object and two to be 0.
+bool starts_block_upload(const std::uint8_t* frame) {
+  if ((frame[0] & 0xFBU) != 0xA0U || frame[4] == 0 || frame[4] > 127 || frame[6] != 0 || frame[7] != 0)
+    return false;
+  std::uint32_t code = co::abort::none;
+  return find(load_u16(frame + 1), frame[3], code) != nullptr;
+}
+
+}  // namespace
+
+/// Whether a request is a segment of the block download that runs. Its numbers are below 64, those of the frames that
+/// start uploads, block downloads and their ends are not. Once the last one is here, only copies of it and late ones
+/// come. The client may be another one, that knows nothing of the transfer.
+bool CanopenNode::is_block_segment(const std::uint8_t* frame) const {
+  if (transfer_ != Transfer::block_download || frame[0] == last_of_block) return false;
+  if ((frame[0] & segment_number) > co::most_segments) return false;
+  if (starts_block_upload(frame)) return false;
+  return block_ == Block::segments || frame[0] < last_of_block ||
+         std::memcmp(segment_.data(), frame, segment_.size()) == 0;
+}
+
+/// Whether a request is one of the segments that were under way when this node has aborted their transfer: they are not
+/// answered, as each of them would be another request.
+bool CanopenNode::is_leftover(const std::uint8_t* frame) {
+  const unsigned number = frame[0] & segment_number;
+  if (leftover_ >= leftovers_ || number != leftover_ + 1U) {
+    leftovers_ = 0;
+    return false;
+  }
+  ++leftover_;
+  return true;
+}
+
+// Initiate block download. cc, sc: the client, the server makes a CRC; s: size indicated.
+//   request   byte 0: 110 00 cc s 0   1-2: index   3: sub-index   4-7: size (s)
+//   response  byte 0: 101 00 sc 00    1-2: index   3: sub-index   4: segments of the sub-block
+void CanopenNode::begin_block_download(const std::uint8_t* frame) {
+  forget();
+  index_ = load_u16(frame + 1);
+  sub_ = frame[3];
+  done_ = 0;
+  size_known_ = (frame[0] & 2U) != 0;
+  with_crc_ = (frame[0] & 4U) != 0;
+  size_ = size_known_ ? load_u32(frame + 4) : 0;
+  const std::uint32_t code = accept(size_, size_known_);
+  if (code != co::abort::none) {
+    abort(code);
+    return;
+  }
+  transfer_ = Transfer::block_download;
+  block_ = Block::segments;
+  block_size_ = segments_taken(settings_);
+  sequence_ = 0;
+  crc_ = 0;
+  std::uint8_t answer[8] = {0xA4};
+  std::memcpy(answer + 1, frame + 1, 3);
+  answer[4] = block_size_;
+  reply(answer);
+}
+
+// Segment of a block download. c: last segment.
+//   request   byte 0: c, number of the segment (7 bits)   1-7: data
+//   response, after the sub-block   byte 0: 101 000 10    1: last segment taken   2: segments of the next sub-block
+// Segments out of order are passed over; the client sends what follows the last one taken once more. The last segment is
+// kept until the end of the transfer says how many of its bytes count.
+void CanopenNode::block_segment(const std::uint8_t* frame) {
+  const unsigned number = frame[0] & segment_number;
+  const bool last = frame[0] >= last_of_block;
+  // The segment that was acknowledged at last comes again: it was doubled, or the response was lost. It is not the
+  // first of the next sub-block, as no sub-block but the last has one segment only.
+  const bool again = repeatable_ == Transfer::block_download && sequence_ == 0 &&
+                     std::memcmp(segment_.data(), frame, segment_.size()) == 0;
+  if (again && (block_ == Block::end || number != 1)) {
+    const std::uint8_t answer[8] = {0xA2, acknowledged_, block_size_};
+    reply(answer);
+    return;
+  }
+  if (block_ == Block::end) return;
+  if (number == 0) {
+    abort(co::abort::sequence);
+    return;
+  }
+  if (number > block_size_) return;
+  const bool next = number == sequence_ + 1U;
+  if (next) {
+    touched_ = true;
+    ++sequence_;
+    std::uint32_t code = co::abort::none;
+    if (!last) {
+      code = take(frame + 1, 7);
+      crc_ = co::crc16(crc_, frame + 1, 7);
+    }
+    if (code != co::abort::none) {
+      abort(code);
+      return;
+    }
+  }
+  if (next && last) block_ = Block::end;
+  if (last || number == block_size_) acknowledge(frame);
+}
+
+/// Answers the last segment of a sub-block, `frame`.
+void CanopenNode::acknowledge(const std::uint8_t* frame) {
+  acknowledged_ = sequence_;
+  sequence_ = 0;
+  const std::uint8_t most = segments_taken(settings_);
+  block_size_ = static_cast<std::uint8_t>(block_size_ == most ? most - 1 : most);
+  repeatable_ = Transfer::block_download;
+  std::memcpy(segment_.data(), frame, segment_.size());
+  const std::uint8_t answer[8] = {0xA2, acknowledged_, block_size_};
+  reply(answer);
+}
+
+// End of a block download. n: bytes of the last segment without data.
+//   request   byte 0: 110 nnn 01   1-2: CRC
+//   response  byte 0: 101 000 01
+// The request once more, where the response was lost, is answered again.
+void CanopenNode::end_block_download(const std::uint8_t* frame) {
+  const std::uint8_t answer[8] = {0xA1};
+  if (transfer_ == Transfer::none && repeatable_ == Transfer::block_download &&
+      std::memcmp(segment_.data(), frame, segment_.size()) == 0) {
+    reply(answer);
+    return;
+  }
+  if (transfer_ != Transfer::block_download || block_ != Block::end) {
+    abort_without_transfer();
+    return;
+  }
+  const std::uint32_t size = 7U - ((frame[0] >> 2U) & 7U);
+  std::uint32_t code = take(segment_.data() + 1, size);
+  crc_ = co::crc16(crc_, segment_.data() + 1, size);
+  if (code == co::abort::none && size_known_ && done_ != size_) code = co::abort::too_short;
+  if (code == co::abort::none && with_crc_ && crc_ != load_u16(frame + 1)) code = co::abort::crc;
+  if (code == co::abort::none) code = complete();
+  if (code != co::abort::none) {
+    abort(code);
+    return;
+  }
+  transfer_ = Transfer::none;
+  repeatable_ = Transfer::block_download;
+  std::memcpy(segment_.data(), frame, segment_.size());
+  reply(answer);
+}
+
+/// Requests of a block upload, by their sub-command. One that does not fit where the transfer is, is a copy, or answers one.
+void CanopenNode::block_upload(const std::uint8_t* frame) {
+  const unsigned subcommand = frame[0] & block_subcommand;
+  if (subcommand == block_initiate) {
+    begin_block_upload(frame);
+    return;
+  }
+  if (transfer_ != Transfer::block_upload) {
+    // The end of an upload is not answered; a copy of it neither.
+    if (transfer_ != Transfer::none || subcommand != block_ended) abort_without_transfer();
+    return;
+  }
+  if (subcommand == block_taken) {
+    block_acknowledged(frame);
+    return;
+  }
+  if (subcommand == block_ended) {
+    if (block_ == Block::end) {
+      transfer_ = Transfer::none;
+    } else {
+      abort(co::abort::command);
+    }
+    return;
+  }
+  // Sub-command 3, start. Once more where all segments of the first sub-block were lost.
+  const bool all_sent = sequence_ == block_size_ || done_ + 7U * sequence_ >= size_;
+  if (block_ == Block::segments && done_ == 0 && all_sent) sequence_ = 0;
+  if (block_ == Block::initiated) block_ = Block::segments;
+  send_segments();
+}
+
+// Initiate block upload. pst: size up to which the server may answer as to 010.
+//   request   byte 0: 101 00 cc 00    1-2: index   3: sub-index   4: segments of a sub-block   5: pst
+//   response  byte 0: 110 00 sc s 0   1-2: index   3: sub-index   4-7: size
+//   request   byte 0: 101 000 11
+void CanopenNode::begin_block_upload(const std::uint8_t* frame) {
+  forget();
+  index_ = load_u16(frame + 1);
+  sub_ = frame[3];
+  std::uint32_t size = 0;
+  std::uint32_t code = start_upload(size);
+  if (code == co::abort::none && (frame[4] == 0 || frame[4] > 127)) code = co::abort::block_size;
+  if (code != co::abort::none) {
+    abort(code);
+    return;
+  }
+  if (frame[5] != 0 && size <= frame[5]) {
+    begin_upload(frame);
+    return;
+  }
+  transfer_ = Transfer::block_upload;
+  block_ = Block::initiated;
+  with_crc_ = (frame[0] & 4U) != 0;
+  alternating_ = false;
+  block_size_ = frame[4];
+  size_ = size;
+  done_ = 0;
+  sequence_ = 0;
+  highest_ = 0;
+  crc_ = 0;
+  crc_bytes_ = 0;
+  segment_ = {};
+  std::uint8_t answer[8] = {0xC6};
+  std::memcpy(answer + 1, frame + 1, 3);
+  store_u32(answer + 4, size);
+  reply(answer);
+}
+
+// Response of the client to a sub-block.
+//   request   byte 0: 101 000 10   1: last segment taken   2: segments of the next sub-block
+// A copy of the response before, where sizes alternate, is passed over while the sub-block goes out; after that it says that
+// nothing of the sub-block has arrived.
+void CanopenNode::block_acknowledged(const std::uint8_t* frame) {
+  if (block_ == Block::end) {
+    end_block_upload();
+    return;
+  }
+  if (alternating_ && std::memcmp(segment_.data(), frame, segment_.size()) == 0) {
+    const bool all_sent = sequence_ == block_size_ || done_ + 7U * sequence_ >= size_;
+    if (all_sent) sequence_ = 0;
+    send_segments();
+    return;
+  }
+  if (frame[1] > highest_) {
+    abort(co::abort::sequence);
+    return;
+  }
+  if (frame[2] == 0 || frame[2] > 127) {
+    abort(co::abort::block_size);
+    return;
+  }
+  alternating_ = frame[2] != block_size_;
+  std::memcpy(segment_.data(), frame, segment_.size());
+  const std::uint32_t taken = 7U * frame[1];
+  done_ = taken < size_ - done_ ? done_ + taken : size_;
+  block_size_ = frame[2];
+  sequence_ = 0;
+  highest_ = 0;
+  if (done_ == size_) {
+    end_block_upload();
+    return;
+  }
+  block_ = Block::segments;
+  send_segments();
+}
+
+/// Sends segments of a block upload until the sub-block is out, the queue is full, or there were segments_per_call.
+//   byte 0: c, number of the segment (7 bits)   1-7: data
+void CanopenNode::send_segments() {
+  const std::uint16_t id = static_cast<std::uint16_t>(co::sdo_answer_id + settings_.node);
+  for (unsigned k = 0; k < segments_per_call; ++k) {
+    if (transfer_ != Transfer::block_upload || block_ != Block::segments || pending_) return;
+    const std::uint32_t offset = done_ + 7U * sequence_;
+    if (sequence_ == block_size_ || offset >= size_) return;
+    const std::uint32_t n = size_ - offset < 7 ? size_ - offset : 7;
+    std::uint8_t segment[8] = {static_cast<std::uint8_t>(sequence_ + 1U)};
+    if (offset + n == size_) segment[0] = static_cast<std::uint8_t>(segment[0] | last_of_block);
+    if (!read_segment(offset, segment + 1, n)) {
+      abort(co::abort::device_state);
+      return;
+    }
+    if (transmit_.send == nullptr || !transmit_.send(transmit_.user, id, segment, 8)) return;
+    touched_ = true;
+    ++sequence_;
+    if (sequence_ > highest_) highest_ = sequence_;
+    if (offset == crc_bytes_) {
+      crc_ = co::crc16(crc_, segment + 1, n);
+      crc_bytes_ += n;
+    }
+  }
+}
+
+// End of a block upload.
+//   byte 0: 110 nnn 01   1-2: CRC, or 0 where the client makes none
+//   request, which is not answered   byte 0: 101 000 01
+void CanopenNode::end_block_upload() {
+  block_ = Block::end;
+  const unsigned unused = (7U - size_ % 7U) % 7U;
+  std::uint8_t answer[8] = {static_cast<std::uint8_t>(0xC1U | (unused << 2U))};
+  store_u16(answer + 1, with_crc_ ? crc_ : std::uint16_t{0});
   reply(answer);
 }
 
@@ -435,10 +903,21 @@ std::uint32_t CanopenNode::set(const std::uint8_t* bytes, std::uint32_t size) {
   switch (index_) {
     case co::store_parameters:
       if (load_u32(bytes) != co::save_signature) return co::abort::not_stored;
+      if (sub_ == co::communication_parameters) return save_communication(false);
       return command(wire::Command::commit, 0);
     case co::restore_parameters:
       if (load_u32(bytes) != co::load_signature) return co::abort::not_stored;
+      if (sub_ == co::communication_parameters) return save_communication(true);
       return command(wire::Command::restore_defaults, 0);
+    case co::error_history:
+      if (bytes[0] != 0) return co::abort::value;
+      history_size_ = 0;
+      return co::abort::none;
+    case co::emergency:
+      return set_emergency_id(load_u32(bytes));
+    case co::emergency_inhibit:
+      emergency_inhibit_ = load_u16(bytes);
+      return co::abort::none;
     case co::heartbeat_time:
       heartbeat_time_ = load_u16(bytes);
       return co::abort::none;
@@ -474,6 +953,16 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
     case co::error_register:
       number = device_.store().faults() != 0 ? 1U : 0U;
       break;
+    case co::error_history:
+      if (sub_ > history_size_) return co::abort::no_data;
+      number = sub_ == 0 ? history_size_ : history_[sub_ - 1U];
+      break;
+    case co::emergency:
+      number = emergency_id_;
+      break;
+    case co::emergency_inhibit:
+      number = emergency_inhibit_;
+      break;
     case co::device_name:
     case co::software_version: {
       const char* const text = index_ == co::device_name ? "flexcomp" : firmware_version_text;
@@ -483,7 +972,10 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
     }
     case co::store_parameters:
     case co::restore_parameters:
-      number = 1;  // sub 0: one sub-index; sub 1: on command
+      // Sub 0: two sub-indices; sub 1 and 2: on command.
+      number = sub_ == 0 ? 2U : 1U;
+      if (sub_ == co::communication_parameters && (memory_.load == nullptr || memory_.save == nullptr))
+        number = 0;
       break;
     case co::heartbeat_time:
       number = heartbeat_time_;

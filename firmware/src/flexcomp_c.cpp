@@ -594,6 +594,14 @@ void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, 
 
 void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms) { can_of(can).node.poll(now_ms); }
 
+void flexcomp_can_set_memory(flexcomp_can* can, flexcomp_can_load load, flexcomp_can_save save, void* user) {
+  can_of(can).node.set_memory({user, load, save});
+}
+
+void flexcomp_can_set_block_size(flexcomp_can* can, unsigned frames) {
+  can_of(can).node.set_block_size(static_cast<std::uint8_t>(frames < 63 ? frames : 63));
+}
+
 flexcomp_rtu* flexcomp_rtu_init(void* memory, size_t size, flexcomp_arm* fc, unsigned unit, uint32_t gap_us,
                                 flexcomp_send send, void* user) {
   if (!fits<Rtu>(memory, size) || fc == nullptr || unit < 1 || unit > 247 || send == nullptr) return nullptr;

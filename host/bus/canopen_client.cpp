@@ -136,7 +136,7 @@ class CanopenClient final : public ControllerClient {
   Bytes upload(ObjectAddress object, std::size_t size, const Progress& progress = {}) {
     Bytes out;
     repeat("to read", object, disturbed_response_times * timeout_,
-           [&] { out = sdo_.upload(object, progress); });
+           [&] { out = sdo_.upload(object, progress, size); });
     if (out.size() != size) {
       throw BusError(where(), fmt::format("object {} of node {} has {} bytes, expected {}", object.text(),
                                           node_, out.size(), size));
@@ -173,7 +173,8 @@ class CanopenClient final : public ControllerClient {
       } catch (const SdoAbort& e) {
         // A lost or doubled frame, or another client's transfer, ends in one of these codes.
         const bool disturbed = !e.by_server() || e.code() == co::abort::toggle ||
-                               e.code() == co::abort::timeout || e.code() == co::abort::command;
+                               e.code() == co::abort::timeout || e.code() == co::abort::command ||
+                               e.code() == co::abort::sequence || e.code() == co::abort::crc;
         if (!disturbed)
           throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
         if (steady_clock::now() - start >= longest) {

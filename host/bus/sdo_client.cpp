@@ -39,6 +39,21 @@ constexpr unsigned size_indicated = 0x01;
 constexpr unsigned last_segment = 0x01;
 constexpr unsigned toggle_bit = 0x10;
 
+// Of block transfers; what one side begins the other one answers with the other's specifier.
+constexpr unsigned block_download = 0xC0;
+constexpr unsigned block_upload = 0xA0;
+constexpr unsigned with_crc = 0x04;
+constexpr unsigned block_size_indicated = 0x02;
+constexpr unsigned subcommand_mask = 0xE3;
+constexpr unsigned upload_answer_mask = 0xE1;  ///< of the server: bit 0 tells the end from the start
+constexpr unsigned block_end = 0x01;
+constexpr unsigned sub_block_taken = 0x02;
+constexpr unsigned block_start = 0x03;
+constexpr unsigned last_of_block = 0x80;
+constexpr unsigned segment_number = 0x7F;
+/// Sub-blocks after which nothing has arrived, one after the other.
+constexpr int most_in_vain = 20;
+
 constexpr std::size_t in_segment = 7;
 constexpr std::size_t in_expedited = 4;
 
@@ -52,6 +67,9 @@ constexpr std::array abort_codes = std::to_array<AbortCode>({
     {0x05030000, "toggle bit not alternated"},
     {0x05040000, "SDO protocol timed out"},
     {0x05040001, "command specifier not valid or unknown"},
+    {0x05040002, "invalid block size"},
+    {0x05040003, "invalid sequence number"},
+    {0x05040004, "CRC error"},
     {0x05040005, "out of memory"},
     {0x06010000, "unsupported access to an object"},
     {0x06010001, "attempt to read a write-only object"},
@@ -185,8 +203,9 @@ SdoClient::Fit SdoClient::fit(const Payload& answer, const Expected& expected) c
   const bool same_object =
       load_u16(answer.data() + 1) == expected.object.index && answer[3] == expected.object.sub;
   if (expected.first) {
-    if (names_object && !same_object) return Fit::foreign;
-    return specifier == expected.specifier ? Fit::yes : Fit::doubled;
+    const bool fits = (answer[0] & expected.mask) == expected.specifier;
+    if ((names_object || fits) && !same_object) return Fit::foreign;
+    return fits ? Fit::yes : Fit::doubled;
   }
   if (names_object) {
     // Our object: the answer to the start came twice; once the segments run, the server has begun anew. Another object
@@ -194,11 +213,30 @@ SdoClient::Fit SdoClient::fit(const Payload& answer, const Expected& expected) c
     if (same_object) return expected.segment == 0 ? Fit::doubled : Fit::out_of_step;
     return specifier == upload_initiated && (answer[0] & expedited) == 0 ? Fit::out_of_step : Fit::foreign;
   }
+  if (expected.mask != specifier_mask) {
+    // Of a block download only its end; the server's answers before may come again.
+    if ((answer[0] & expected.mask) == expected.specifier) return Fit::yes;
+    return specifier == block_upload ? Fit::doubled : Fit::foreign;
+  }
   if (specifier != expected.specifier) return Fit::foreign;
   if ((answer[0] & toggle_bit) == expected.toggle) return Fit::yes;
   // What is no copy of the last answer shows that an older one was taken for it.
   const bool copy = expected.segment == 0 || answer == last_;
   return copy ? Fit::doubled : Fit::out_of_step;
+}
+
+void SdoClient::throw_if_ours(const Payload& answer, const Expected& expected) {
+  const ObjectAddress object = expected.object;
+  const std::uint32_t code = load_u32(answer.data() + 4);
+  const bool of_segments = code == co::abort::toggle || code == co::abort::timeout ||
+                           code == co::abort::sequence || code == co::abort::crc;
+  const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
+  // A segment is answered by an abort about another object where that one has replaced the transfer. The start of
+  // a transfer is answered by none of the codes of segments: those are of an earlier one.
+  const bool ours =
+      expected.first ? same_object && !of_segments : same_object || of_segments || code == co::abort::command;
+  if (ours) throw SdoAbort(object, code, true);
+  ++(same_object ? disturbances_.doubled : disturbances_.foreign);
 }
 
 SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& expected, bool once) {
@@ -224,15 +262,7 @@ SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& e
       }
     }
     if (answer[0] == aborted) {
-      const std::uint32_t code = load_u32(answer.data() + 4);
-      const bool of_segments = code == co::abort::toggle || code == co::abort::timeout;
-      const bool same_object = load_u16(answer.data() + 1) == object.index && answer[3] == object.sub;
-      // A segment is answered by an abort about another object where that one has replaced the transfer. The start of
-      // a transfer is answered by none of the codes of segments: those are of an earlier one.
-      const bool ours = expected.first ? same_object && !of_segments
-                                       : same_object || of_segments || code == co::abort::command;
-      if (ours) throw SdoAbort(object, code, true);
-      ++(same_object ? disturbances_.doubled : disturbances_.foreign);
+      throw_if_ours(answer, expected);
       continue;
     }
     switch (fit(answer, expected)) {
@@ -273,6 +303,7 @@ void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> dat
     exchange(expedited_frame(object, data), {object, download_initiated});
     return;
   }
+  if (data.size() > in_few_segments && server_blocks_ && download_block(object, data, progress)) return;
   Payload frame{};
   address(frame, object);
   frame[0] = download_initiate | size_indicated;
@@ -297,8 +328,205 @@ void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> dat
   } while (at != data.size());
 }
 
-std::vector<std::uint8_t> SdoClient::upload(ObjectAddress object, const Progress& progress) {
+bool SdoClient::download_block(ObjectAddress object, std::span<const std::uint8_t> data,
+                               const Progress& progress) {
+  Payload frame{};
+  address(frame, object);
+  frame[0] = block_download | with_crc | block_size_indicated;
+  store_u32(frame.data() + 4, static_cast<std::uint32_t>(data.size()));
+  Payload answer;
+  try {
+    answer = exchange(frame, {.object = object, .specifier = block_upload, .mask = subcommand_mask});
+  } catch (const SdoAbort& e) {
+    if (!e.by_server() || e.code() != co::abort::command) throw;
+    server_blocks_ = false;
+    return false;
+  }
+  const bool crc_wanted = (answer[0] & with_crc) != 0;
+  unsigned most = answer[4];
+  if (most == 0 || most > segment_number) abort(object, co::abort::block_size);
+  bool alternates = false;
+  int in_vain = 0;
+  std::size_t at = 0;
+  Payload last_segment;
+  try {
+    while (at != data.size()) {
+      const std::size_t sent = send_sub_block(data, at, most, last_segment, progress);
+      answer = await_taken(object, last_segment, static_cast<unsigned>(sent), alternates);
+      at = std::min(data.size(), at + in_segment * answer[1]);
+      in_vain = answer[1] == 0 ? in_vain + 1 : 0;
+      if (in_vain == most_in_vain) abort(object, co::abort::sequence);
+      if (answer[2] == 0 || answer[2] > segment_number) abort(object, co::abort::block_size);
+      alternates = answer[2] != most;
+      most = answer[2];
+    }
+    const auto unused = static_cast<unsigned>((in_segment - data.size() % in_segment) % in_segment);
+    frame = {};
+    frame[0] = static_cast<std::uint8_t>(block_download | (unused << 2U) | block_end);
+    if (crc_wanted) {
+      store_u16(frame.data() + 1, co::crc16(0, data.data(), static_cast<std::uint32_t>(data.size())));
+    }
+    exchange(
+        frame,
+        {.object = object, .specifier = block_upload | block_end, .first = false, .mask = subcommand_mask});
+  } catch (const SdoAbort& e) {
+    // The server has accepted this length: segments of two sub-blocks were mixed up on the way.
+    const bool of_length = e.code() == co::abort::too_long || e.code() == co::abort::too_short;
+    if (e.by_server() && of_length) throw SdoAbort(object, co::abort::sequence, false);
+    throw;
+  }
+  return true;
+}
+
+std::size_t SdoClient::send_sub_block(std::span<const std::uint8_t> data, std::size_t at, unsigned most,
+                                      Payload& last, const Progress& progress) {
+  const auto end = steady_clock::now() + timeout_;
+  std::size_t sent = 0;
+  while (sent != most && at != data.size()) {
+    const std::size_t size = std::min(in_segment, data.size() - at);
+    last = {};
+    last[0] = static_cast<std::uint8_t>(++sent);
+    std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), size, last.begin() + 1);
+    at += size;
+    if (at == data.size()) last[0] = static_cast<std::uint8_t>(last[0] | last_of_block);
+    send(last, end);
+    if (progress) progress(at, data.size());
+  }
+  return sent;
+}
+
+/// The server's answer to a sub-block of so many segments. Without one the last segment is sent again: it was lost, or its
+/// answer. Where the server alternates between two sizes, an answer equal to the one before is a copy of it.
+SdoClient::Payload SdoClient::await_taken(ObjectAddress object, const Payload& last_segment, unsigned sent,
+                                          bool alternates) {
+  const auto end = steady_clock::now() + timeout_;
+  auto wait = std::max(timeout_ / 12, milliseconds(1));
+  auto again = steady_clock::now() + wait;
+  Payload answer;
+  for (;;) {
+    if (!receive(answer, std::min(again, end))) {
+      if (steady_clock::now() >= end) {
+        try {
+          abort(object, co::abort::timeout);
+        } catch (const SdoAbort&) {
+          throw SdoTimeout(fmt::format("no answer about {}", object.text()));
+        }
+      }
+      ++disturbances_.lost;
+      send(last_segment, end);
+      wait *= 2;
+      again = steady_clock::now() + wait;
+    } else if (answer[0] == aborted) {
+      throw_if_ours(answer, {.object = object, .first = false});
+    } else if ((answer[0] & subcommand_mask) == (block_upload | sub_block_taken) && answer[1] <= sent &&
+               !(alternates && answer == last_)) {
+      last_ = answer;
+      return answer;
+    } else {
+      ++((answer[0] & specifier_mask) == block_upload ? disturbances_.doubled : disturbances_.foreign);
+    }
+  }
+}
+
+/// Nothing where the server has no block transfer.
+std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress object,
+                                                                 const Progress& progress) {
+  unsigned most = co::most_segments;
+  Payload request{};
+  address(request, object);
+  request[0] = block_upload | with_crc;
+  request[4] = static_cast<std::uint8_t>(most);
+  Payload answer;
+  try {
+    answer = exchange(request, {.object = object, .specifier = block_download, .mask = upload_answer_mask});
+  } catch (const SdoAbort& e) {
+    if (!e.by_server() || e.code() != co::abort::command) throw;
+    server_blocks_ = false;
+    return std::nullopt;
+  }
+  const bool is_announced = (answer[0] & block_size_indicated) != 0;
+  const bool crc_given = (answer[0] & with_crc) != 0;
+  const std::size_t announced = load_u32(answer.data() + 4);
+  const std::size_t longest_here = is_announced ? std::min(announced, longest) : longest;
+
+  std::vector<std::uint8_t> out;
+  unsigned taken = 0;  // of this sub-block
+  bool complete = false;
+  request = {block_upload | block_start};
+  auto wait = std::max(timeout_ / 12, milliseconds(1));
+  auto now = steady_clock::now();
+  auto end = now + timeout_;
+  auto again = now + wait;
+  const auto take_stock = [&] {
+    most = most == co::most_segments ? co::most_segments - 1U : co::most_segments;
+    request = {static_cast<std::uint8_t>(block_upload | sub_block_taken), static_cast<std::uint8_t>(taken),
+               static_cast<std::uint8_t>(most)};
+    taken = 0;
+    send(request, end);
+    again = steady_clock::now() + wait;
+  };
+  send(request, end);
+  for (;;) {
+    if (!receive(answer, std::min(again, end))) {
+      now = steady_clock::now();
+      if (now >= end) {
+        try {
+          abort(object, co::abort::timeout);
+        } catch (const SdoAbort&) {
+          throw SdoTimeout(fmt::format("no answer about {}", object.text()));
+        }
+      }
+      ++disturbances_.lost;
+      if (taken != 0) {
+        take_stock();
+      } else {
+        send(request, end);
+        wait *= 2;
+        again = now + wait;
+      }
+      continue;
+    }
+    if (answer[0] == aborted) {
+      throw_if_ours(answer, {.object = object, .first = false});
+      continue;
+    }
+    if (complete && (answer[0] & upload_answer_mask) == (block_download | block_end)) break;
+    const unsigned number = answer[0] & segment_number;
+    const bool last = (answer[0] & last_of_block) != 0;
+    if (complete || number == 0 || number > most) {
+      // Ours are below 64: what is above answers other clients, or is the server's first answer once more.
+      const bool names_other = number >= 0x40 && number < 0x70 && !last;
+      ++(names_other ? disturbances_.foreign : disturbances_.doubled);
+      continue;
+    }
+    if (number == taken + 1) {
+      ++taken;
+      out.insert(out.end(), answer.begin() + 1, answer.end());
+      if (out.size() >= longest_here + in_segment) abort(object, co::abort::too_long);
+      complete = last;
+      if (progress) progress(std::min(out.size(), longest_here), is_announced ? announced : out.size());
+      wait = std::max(timeout_ / 12, milliseconds(1));
+      now = steady_clock::now();
+      end = now + timeout_;
+      again = now + wait;
+    }
+    if (last || number == most) take_stock();
+  }
+  const std::size_t unused = (answer[0] >> 2U) & 7U;
+  out.resize(out.size() - std::min(unused, out.size()));
+  const auto crc = co::crc16(0, out.data(), static_cast<std::uint32_t>(out.size()));
+  if (crc_given && crc != load_u16(answer.data() + 1)) abort(object, co::abort::crc);
+  if (is_announced && out.size() != announced) abort(object, co::abort::too_short);
+  send({static_cast<std::uint8_t>(block_upload | block_end)}, steady_clock::now() + timeout_);
+  return out;
+}
+
+std::vector<std::uint8_t> SdoClient::upload(ObjectAddress object, const Progress& progress,
+                                            std::size_t expected_size) {
   drain();
+  if (expected_size > in_few_segments && server_blocks_) {
+    if (auto out = upload_block(object, progress)) return *std::move(out);
+  }
   Payload frame{};
   frame[0] = upload_initiate;
   address(frame, object);

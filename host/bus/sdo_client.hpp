@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Client of a CANopen SDO channel (CiA 301, 7.2.4): expedited and segmented transfers over a CAN socket.
+/// Client of a CANopen SDO channel (CiA 301, 7.2.4): expedited, segmented and block transfers over a CAN socket.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -63,12 +64,17 @@ class SdoClient {
   ///                 twice as long, and so on
   SdoClient(int socket, std::uint8_t node, std::chrono::milliseconds timeout);
 
-  /// Reads an object: expedited or segmented upload (CiA 301, 7.2.4.3). \throws SdoAbort, SdoTimeout, std::system_error
-  std::vector<std::uint8_t> upload(ObjectAddress object, const Progress& progress = {});
-  /// Writes an object: expedited up to 4 bytes, else segmented download (CiA 301, 7.2.4.3). Throws as upload().
+  /// Reads an object: expedited, segmented or, where more than in_few_segments bytes are expected, block upload (CiA 301,
+  /// 7.2.4.3). A server that has no block transfer is asked for segments. \throws SdoAbort, SdoTimeout, std::system_error
+  std::vector<std::uint8_t> upload(ObjectAddress object, const Progress& progress = {},
+                                   std::size_t expected_size = 0);
+  /// Writes an object: expedited up to 4 bytes, segmented up to in_few_segments, else block download. Throws as upload().
   void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {});
   /// The same for at most 4 bytes, sent once and waited for a quarter of the time limit: for what must not be done twice.
   void download_once(ObjectAddress object, std::span<const std::uint8_t> data);
+
+  /// Bytes up to which a block transfer has no fewer frames than a segmented one.
+  static constexpr std::size_t in_few_segments = 28;
 
   /// Takes in what still comes until nothing has come for a moment, at most a tenth of the time limit: after a transfer
   /// that was broken off its late answers must not be taken for those of the next one.
@@ -87,11 +93,18 @@ class SdoClient {
     bool first = true;    ///< of the transfer: the answer names the object
     unsigned toggle = 0;  ///< of a segment
     unsigned segment = 0;
+    unsigned mask = 0xE0;  ///< bits of the first byte that are the specifier
   };
   enum class Fit { yes, doubled, foreign, out_of_step };
 
   std::vector<std::uint8_t> upload_segments(ObjectAddress object, std::size_t announced, bool is_announced,
                                             const Progress& progress);
+  bool download_block(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress);
+  std::size_t send_sub_block(std::span<const std::uint8_t> data, std::size_t at, unsigned most, Payload& last,
+                             const Progress& progress);
+  Payload await_taken(ObjectAddress object, const Payload& last_segment, unsigned sent, bool alternates);
+  std::optional<std::vector<std::uint8_t>> upload_block(ObjectAddress object, const Progress& progress);
+  void throw_if_ours(const Payload& answer, const Expected& expected);
   Payload expedited_frame(ObjectAddress object, std::span<const std::uint8_t> data) const;
   Payload exchange(const Payload& request, const Expected& expected, bool once = false);
   Fit fit(const Payload& answer, const Expected& expected) const;
@@ -103,7 +116,8 @@ class SdoClient {
   int socket_;
   std::uint8_t node_;
   std::chrono::milliseconds timeout_;
-  Payload last_{};  ///< the last answer that was taken
+  Payload last_{};             ///< the last answer that was taken
+  bool server_blocks_ = true;  ///< until it refuses
   SdoDisturbances disturbances_;
 };
 

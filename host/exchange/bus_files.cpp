@@ -27,6 +27,7 @@ namespace map = wire::modbus;
 
 constexpr unsigned variable_object = 7;
 constexpr unsigned domain_object = 2;
+constexpr unsigned array_object = 8;
 constexpr unsigned record_object = 9;
 
 const char* access(co::Access a) {
@@ -57,6 +58,9 @@ std::string default_value(const co::Object& o, std::size_t highest_sub) {
   if (o.index == co::device_name) return "flexcomp";
   if (o.index == co::identity && o.sub == 1) return "0x00000000";
   if (o.index == co::identity && o.sub == 2) return fmt::format("0x{:08X}", co::product_code);
+  if (o.index == co::error_history && o.sub == 0) return "0";
+  if (o.index == co::emergency) return fmt::format("$NODEID+0x{:X}", co::emergency_id);
+  if (o.index == co::emergency_inhibit) return fmt::format("{}", co::emergency_inhibit_default);
   if (o.index == co::sdo_server && o.sub == 1) return fmt::format("$NODEID+0x{:X}", co::sdo_request_id);
   if (o.index == co::sdo_server && o.sub == 2) return fmt::format("$NODEID+0x{:X}", co::sdo_answer_id);
   return "";
@@ -255,7 +259,7 @@ std::string electronic_data_sheet(const std::string& file) {
   sheet.section("Comments");
   sheet.put("Lines", 2);
   sheet.put("Line1", "Records of type DOMAIN are described in include/flexcomp/wire/store_state.hpp.");
-  sheet.put("Line2", "SDO transfers are expedited or segmented; there are no PDOs.");
+  sheet.put("Line2", "SDO transfers are expedited, segmented or in blocks; there are no PDOs.");
   const std::array<const char*, 3> names{"MandatoryObjects", "OptionalObjects", "ManufacturerObjects"};
   for (std::size_t list = 0; list < lists.size(); ++list) {
     sheet.section(names[list]);
@@ -273,7 +277,8 @@ std::string electronic_data_sheet(const std::string& file) {
       }
       sheet.section(section);
       sheet.put("ParameterName", co::record_name(index));
-      sheet.put("ObjectType", fmt::format("0x{:X}", record_object));
+      sheet.put("ObjectType",
+                fmt::format("0x{:X}", index == co::error_history ? array_object : record_object));
       sheet.put("SubNumber", static_cast<unsigned>(objects.size()));
       for (const co::Object* o : objects)
         put_object(sheet, *o, fmt::format("{}sub{:X}", section, o->sub), o->name, objects.back()->sub);

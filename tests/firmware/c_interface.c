@@ -51,13 +51,28 @@ static void send_bytes(void* user, const uint8_t* bytes, size_t size) {
 }
 
 static uint16_t frames[16];
+static uint8_t last_frame[8];
 static unsigned frame_count;
 
 static int send_frame(void* user, uint16_t id, const uint8_t* bytes, uint8_t size) {
   (void)user;
-  (void)bytes;
-  (void)size;
+  memset(last_frame, 0, sizeof last_frame);
+  memcpy(last_frame, bytes, size);
   if (frame_count < 16) frames[frame_count++] = id;
+  return 1;
+}
+
+static uint8_t communication[8];
+
+static int load_communication(void* user, uint8_t* bytes) {
+  (void)user;
+  memcpy(bytes, communication, sizeof communication);
+  return 1;
+}
+
+static int save_communication(void* user, const uint8_t* bytes) {
+  (void)user;
+  memcpy(communication, bytes, sizeof communication);
   return 1;
 }
 
@@ -185,12 +200,29 @@ int main(void) {
 
   EXPECT(flexcomp_can_init(&can_memory, sizeof can_memory, fc, 128, 0, send_frame, NULL) == NULL);
   can = flexcomp_can_init(&can_memory, sizeof can_memory, fc, 3, 1000, send_frame, NULL);
+  flexcomp_can_set_memory(can, load_communication, save_communication, &calls);
+  flexcomp_can_set_block_size(can, 16);
   flexcomp_can_poll(can, 0);
-  EXPECT(frame_count == 1 && frames[0] == 0x703);
+  /* Boot-up message, EMCY: no valid set. */
+  EXPECT(frame_count == 2 && frames[0] == 0x703 && frames[1] == 0x083);
   {
     const uint8_t upload[8] = {0x40, 0x00, 0x10, 0, 0, 0, 0, 0};
     flexcomp_can_receive(can, 0x603, upload, 8);
-    EXPECT(frame_count == 2 && frames[1] == 0x583);
+    EXPECT(frame_count == 3 && frames[2] == 0x583);
+  }
+  {
+    /* 1010h:2 "save": heartbeat time 1000 ms, inhibit time 100 ms, CRC. */
+    const uint8_t save[8] = {0x23, 0x10, 0x10, 2, 's', 'a', 'v', 'e'};
+    const uint8_t begin[8] = {0xC4, 0x10, 0x20, 1, 0, 0, 0, 0};
+    flexcomp_can_receive(can, 0x603, save, 8);
+    EXPECT(frame_count == 4 && communication[0] == 1 && communication[2] == 0xE8 && communication[3] == 3);
+    flexcomp_can_receive(can, 0x603, begin, 8);
+    EXPECT(frame_count == 5 && last_frame[0] == 0xA4 && last_frame[4] == 16);
+    {
+      const uint8_t end[8] = {0x80, 0x10, 0x20, 1, 0, 0, 0, 8};
+      flexcomp_can_receive(can, 0x603, end, 8);
+      EXPECT(frame_count == 5);
+    }
   }
 
   EXPECT(flexcomp_rtu_init(&rtu_memory, sizeof rtu_memory, fc, 248, 1750, send_bytes, NULL) == NULL);

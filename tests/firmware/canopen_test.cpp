@@ -120,7 +120,8 @@ class Canopen : public testing::Test {
   }
 
   Arm arm;
-  std::vector<Sent> sent;
+  std::vector<Sent> sent;         ///< but for EMCY
+  std::vector<Sent> emergencies;  ///< EMCY
   bool full = false;
   std::uint32_t last_code = 0;
   CanopenNode node{*arm.device,
@@ -129,7 +130,8 @@ class Canopen : public testing::Test {
                    {this, [](void* self, std::uint16_t id, const std::uint8_t* b, std::uint8_t n) {
                       auto& t = *static_cast<Canopen*>(self);
                       if (t.full) return false;
-                      t.sent.push_back({id, Bytes(b, b + n)});
+                      const bool emergency = id == co::emergency_id + node_id;
+                      (emergency ? t.emergencies : t.sent).push_back({id, Bytes(b, b + n)});
                       return true;
                     }}};
 };
@@ -208,8 +210,6 @@ TEST_F(Canopen, AbortCodes) {
   EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), co::abort::device_state) << "nothing staged";
   EXPECT_EQ(command(static_cast<Command>(99)), co::abort::value);
   EXPECT_EQ(command(Command::rollback), co::abort::device_state);
-  EXPECT_EQ(code(ask(head(0xC0, co::image, 1))), co::abort::command) << "block download";
-  EXPECT_EQ(code(ask(head(0xA0, co::image, 2))), co::abort::command) << "block upload";
   EXPECT_EQ(code(ask(head(0xE0, 0, 0))), co::abort::command);
   EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
   EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
@@ -321,6 +321,238 @@ TEST_F(Canopen, PushPullAndProbe) {
   EXPECT_EQ(expedited(0x1011, 1, co::load_signature, 4), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
   EXPECT_EQ(number(co::status_summary, 5), 0U);
+}
+
+Bytes emcy(std::uint16_t code, std::uint8_t faults, Refusal refusal = Refusal::none) {
+  Bytes out(8);
+  store_u16(out.data(), code);
+  out[2] = faults != 0 ? 1 : 0;
+  out[3] = faults;
+  store_u16(out.data() + 5, static_cast<std::uint16_t>(refusal));
+  return out;
+}
+
+TEST_F(Canopen, EmergenciesForFaultsThatComeAndGo) {
+  using namespace wire::fault;
+  namespace ec = co::emergency_code;
+  const auto told = [this](std::uint32_t ms = 1) {
+    emergencies.clear();
+    poll(ms);
+    Bytes out;
+    for (const Sent& s : emergencies) {
+      EXPECT_EQ(s.id, 0x085);
+      out.insert(out.end(), s.bytes.begin(), s.bytes.end());
+    }
+    EXPECT_LE(emergencies.size(), 1U);
+    return out;
+  };
+  ASSERT_EQ(emergencies.size(), 1U) << "after the boot-up message";
+  EXPECT_EQ(emergencies[0].bytes, emcy(ec::no_valid_set, no_valid_set));
+  EXPECT_EQ(number(0x1003, 0), 1U);
+  EXPECT_EQ(number(0x1003, 1), 0x00016301U);
+  EXPECT_EQ(told(1000), Bytes()) << "once";
+
+  // The fault goes with the first set; the history keeps it until it is emptied.
+  download(co::image, 1, make_image(arm.robot, 5));
+  expedited(0x1010, 1, co::save_signature, 4);
+  Bytes all;
+  for (int k = 0; k < 100; ++k) {
+    const Bytes now = told();
+    all.insert(all.end(), now.begin(), now.end());
+  }
+  EXPECT_EQ(all, emcy(ec::none, 0));
+  EXPECT_EQ(upload(0x1001, 0), Bytes{0});
+  EXPECT_EQ(number(0x1003, 0), 1U);
+  EXPECT_EQ(expedited(0x1003, 0, 1, 1), co::abort::value);
+  EXPECT_EQ(expedited(0x1003, 1, 0, 4), co::abort::read_only);
+  EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);
+  EXPECT_EQ(number(0x1003, 0), 0U);
+  EXPECT_EQ(code(ask(head(0x40, 0x1003, 1))), co::abort::no_data);
+  EXPECT_EQ(code(ask(head(0x40, 0x1003, 9))), co::abort::no_sub_index);
+
+  // A trial that nobody confirms: the fault is there while EMCY is off, then it is told; stopped nodes say nothing.
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000085U, 4), 0U);
+  download(co::image, 1, make_image(arm.robot, 6));
+  command(Command::commit_trial, 1);
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(told(), Bytes());
+  EXPECT_EQ(upload(0x1001, 0), Bytes{1});
+  EXPECT_EQ(number(0x1003, 1), static_cast<std::uint32_t>(ec::trial_reverted | trial_reverted << 16));
+  const std::uint8_t stop[2] = {2, 0};
+  const std::uint8_t start[2] = {1, 0};
+  EXPECT_EQ(expedited(0x1014, 0, 0x85, 4), 0U);
+  node.receive(0, stop, 2);
+  EXPECT_EQ(told(1000), Bytes());
+  node.receive(0, start, 2);
+  full = true;
+  EXPECT_EQ(told(1000), Bytes()) << "no room";
+  full = false;
+  EXPECT_EQ(told(), emcy(ec::trial_reverted, trial_reverted));
+  EXPECT_EQ(told(1000), Bytes());
+  // After a reset what is there is told again, and is no new entry of the history.
+  const std::uint8_t reset[2] = {129, node_id};
+  node.receive(0, reset, 2);
+  EXPECT_EQ(told(), emcy(ec::trial_reverted, trial_reverted));
+  EXPECT_EQ(number(0x1003, 0), 1U);
+}
+
+TEST_F(Canopen, EmergencyIdentifierAndInhibitTime) {
+  EXPECT_EQ(number(0x1014, 0), 0x85U);
+  EXPECT_EQ(number(0x1015, 0), 1000U);
+  EXPECT_EQ(expedited(0x1014, 0, 0x86, 4), co::abort::value) << "while there is one";
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000086U, 4), co::abort::value);
+  EXPECT_EQ(expedited(0x1014, 0, 0x80000085U, 4), 0U);
+  EXPECT_EQ(expedited(0x1014, 0, 0xA0000085U, 4), co::abort::value) << "29 bits";
+  EXPECT_EQ(expedited(0x1014, 0, 0xC0000085U, 4), co::abort::value) << "reserved";
+  for (const std::uint32_t id :
+       {0x000U, 0x07FU, 0x101U, 0x180U, 0x581U, 0x5FFU, 0x601U, 0x67FU, 0x6E0U, 0x6FFU, 0x701U, 0x7FFU}) {
+    EXPECT_EQ(expedited(0x1014, 0, id, 4), co::abort::value) << id;
+  }
+  EXPECT_EQ(expedited(0x1014, 0, 0x123456, 4), co::abort::value);
+  EXPECT_EQ(expedited(0x1014, 0, 0x0FE, 4), 0U);
+  EXPECT_EQ(number(0x1014, 0), 0x0FEU);
+  const std::uint8_t reset[2] = {130, node_id};
+  node.receive(0, reset, 2);
+  poll(1);
+  EXPECT_EQ(number(0x1014, 0), 0x85U) << "back to its value at power-on";
+
+  // Faults that flap are told with the inhibit time between: once raised, once gone, and what is there in between.
+  EXPECT_EQ(expedited(0x1015, 0, 500, 2), 0U);
+  const Bytes image = make_image(arm.robot, 5);
+  emergencies.clear();
+  std::uint32_t start_ms = arm.now_ms;
+  for (std::uint32_t k = 0; k < 40; ++k) {
+    arm.push(make_image(arm.robot, 5 + k));
+    node.poll(arm.now_ms);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    node.poll(arm.now_ms);
+  }
+  EXPECT_LE(emergencies.size(), 2 + (arm.now_ms - start_ms) / 50);
+  EXPECT_EQ(number(0x1003, 0), 1U) << "one entry";
+  // Without it each change is told.
+  EXPECT_EQ(expedited(0x1015, 0, 0, 2), 0U);
+  poll(1000);
+  poll(1000);
+  emergencies.clear();
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    arm.push(make_image(arm.robot, 5 + k));
+    node.poll(arm.now_ms);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    node.poll(arm.now_ms);
+  }
+  EXPECT_EQ(emergencies.size(), 8U);
+}
+
+/// 8 bytes that may fail.
+struct CanBytes {
+  std::optional<Bytes> bytes;
+  bool fails = false;
+  CanMemory memory() {
+    return {this,
+            [](void* self, std::uint8_t* to) {
+              const auto& m = *static_cast<CanBytes*>(self);
+              if (m.bytes) std::copy(m.bytes->begin(), m.bytes->end(), to);
+              return m.bytes ? 1 : 0;
+            },
+            [](void* self, const std::uint8_t* from) {
+              auto& m = *static_cast<CanBytes*>(self);
+              if (m.fails) return 0;
+              m.bytes = Bytes(from, from + 8);
+              return 1;
+            }};
+  }
+};
+
+TEST_F(Canopen, CommunicationParametersAreStoredWhereThereIsMemory) {
+  const auto reset = [this](std::uint8_t how) {
+    const std::uint8_t nmt[2] = {how, node_id};
+    node.receive(0, nmt, 2);
+    poll(1);
+  };
+  EXPECT_EQ(number(0x1010, 0), 2U);
+  EXPECT_EQ(number(0x1011, 0), 2U);
+  EXPECT_EQ(number(0x1010, 2), 0U) << "no memory";
+  EXPECT_EQ(number(0x1011, 2), 0U);
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), co::abort::access);
+  EXPECT_EQ(expedited(0x1011, 2, co::load_signature, 4), co::abort::access);
+  EXPECT_EQ(expedited(0x1010, 2, 1, 4), co::abort::not_stored);
+
+  CanBytes kept;
+  node.set_memory(kept.memory());
+  EXPECT_EQ(number(0x1017, 0), 100U) << "an empty memory";
+  EXPECT_EQ(number(0x1010, 2), 1U);
+  EXPECT_EQ(number(0x1011, 2), 1U);
+  EXPECT_EQ(expedited(0x1010, 2, co::load_signature, 4), co::abort::not_stored);
+  expedited(0x1017, 0, 250, 2);
+  expedited(0x1015, 0, 300, 2);
+  reset(130);
+  EXPECT_EQ(number(0x1017, 0), 100U) << "not saved";
+  expedited(0x1017, 0, 250, 2);
+  expedited(0x1015, 0, 300, 2);
+  kept.fails = true;
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), co::abort::hardware);
+  EXPECT_FALSE(kept.bytes);
+  kept.fails = false;
+  EXPECT_EQ(expedited(0x1010, 2, co::save_signature, 4), 0U);
+  EXPECT_EQ(arm.sequence(), 0U) << "no set is committed by it";
+  expedited(0x1017, 0, 400, 2);
+  for (const std::uint8_t how : {std::uint8_t{129}, std::uint8_t{130}}) {
+    reset(how);
+    EXPECT_EQ(number(0x1017, 0), 250U);
+    EXPECT_EQ(number(0x1015, 0), 300U);
+  }
+  // Another node that starts with this memory; a damaged record is none.
+  const Bytes good = *kept.bytes;
+  const auto started = [&] {
+    std::vector<Sent> answers;
+    CanopenNode other(*arm.device, 2, {node_id, 100, 2000},
+                      {&answers, [](void* self, std::uint16_t id, const std::uint8_t* b, std::uint8_t n) {
+                         static_cast<std::vector<Sent>*>(self)->push_back({id, Bytes(b, b + n)});
+                         return true;
+                       }});
+    other.set_memory(kept.memory());
+    other.poll(0);
+    const Frame f = head(0x40, 0x1017, 0);
+    other.receive(co::sdo_request_id + node_id, f.data(), 8);
+    return answers.empty() ? 0 : load_u16(answers.back().bytes.data() + 4);
+  };
+  EXPECT_EQ(started(), 250);
+  for (unsigned bit = 0; bit < 64; ++bit) {
+    kept.bytes = good;
+    (*kept.bytes)[bit / 8] = static_cast<std::uint8_t>((*kept.bytes)[bit / 8] ^ (1U << bit % 8));
+    EXPECT_EQ(started(), 100) << bit;
+  }
+  for (const std::uint8_t blank : {std::uint8_t{0}, std::uint8_t{0xFF}}) {
+    kept.bytes = Bytes(8, blank);
+    EXPECT_EQ(started(), 100);
+  }
+  kept.bytes = good;
+  EXPECT_EQ(expedited(0x1011, 2, co::load_signature, 4), 0U);
+  EXPECT_EQ(number(0x1017, 0), 250U) << "from the next reset on";
+  reset(129);
+  EXPECT_EQ(number(0x1017, 0), 100U);
+  EXPECT_EQ(number(0x1015, 0), 1000U);
+}
+
+TEST_F(Canopen, TheErrorHistoryKeepsTheNewest) {
+  // Two faults by turns: a trial that reverts, and no set at all.
+  EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);
+  for (std::uint32_t k = 0; k < 6; ++k) {
+    ASSERT_EQ(arm.push(make_image(arm.robot, 1 + 2 * k)), Answer::accepted) << k;
+    node.poll(arm.now_ms);
+    ASSERT_EQ(arm.stage(make_image(arm.robot, 2 + 2 * k), 1), Answer::accepted);
+    arm.run(Command::commit_trial, 1, 1);
+    for (int n = 0; n < 200; ++n) poll(1);
+    arm.run(Command::restore_defaults, 0, 1);
+    arm.until_done();
+    poll(1);
+  }
+  EXPECT_EQ(number(0x1003, 0), 8U);
+  const std::uint32_t newest = number(0x1003, 1);
+  EXPECT_EQ(newest & 0xFFFFU, co::emergency_code::no_valid_set);
+  EXPECT_EQ(number(0x1003, 2) & 0xFFFFU, co::emergency_code::trial_reverted);
+  EXPECT_EQ(number(0x1003, 7), newest);
 }
 
 TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
@@ -495,7 +727,9 @@ TEST_F(Canopen, SurvivesMillionsOfBytes) {
     } else {
       node.receive(co::sdo_request_id + node_id, f.data(), 8);
     }
-    ASSERT_LE(sent.size(), 3U);
+    ASSERT_LE(sent.size(), 3U + CanopenNode::segments_per_call);
+    ASSERT_LE(emergencies.size(), 1U);
+    emergencies.clear();
     if (k % 16 == 0) poll(random() % 50);
   }
   EXPECT_FALSE(arm.flash.double_writes);

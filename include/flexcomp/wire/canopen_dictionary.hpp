@@ -49,12 +49,26 @@ struct Object {
 constexpr Object objects[] = {
     {device_type, 0, Type::u32, Access::constant, 4, "Device type"},
     {error_register, 0, Type::u8, Access::ro, 1, "Error register"},
+    {error_history, 0, Type::u8, Access::rw, 1, "Number of errors"},
+    {error_history, 1, Type::u32, Access::ro, 4, "Error 1, the newest"},
+    {error_history, 2, Type::u32, Access::ro, 4, "Error 2"},
+    {error_history, 3, Type::u32, Access::ro, 4, "Error 3"},
+    {error_history, 4, Type::u32, Access::ro, 4, "Error 4"},
+    {error_history, 5, Type::u32, Access::ro, 4, "Error 5"},
+    {error_history, 6, Type::u32, Access::ro, 4, "Error 6"},
+    {error_history, 7, Type::u32, Access::ro, 4, "Error 7"},
+    {error_history, 8, Type::u32, Access::ro, 4, "Error 8"},
     {device_name, 0, Type::text, Access::constant, 0, "Manufacturer device name"},
     {software_version, 0, Type::text, Access::constant, 0, "Manufacturer software version"},
     {store_parameters, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {store_parameters, 1, Type::u32, Access::rw, 4, "Save all parameters: commit what is staged"},
+    {store_parameters, communication_parameters, Type::u32, Access::rw, 4, "Save communication parameters"},
     {restore_parameters, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {restore_parameters, 1, Type::u32, Access::rw, 4, "Restore all defaults: erase both sets"},
+    {restore_parameters, communication_parameters, Type::u32, Access::rw, 4,
+     "Restore default communication parameters"},
+    {emergency, 0, Type::u32, Access::rw, 4, "COB-ID EMCY"},
+    {emergency_inhibit, 0, Type::u16, Access::rw, 2, "Inhibit time EMCY, 100 us"},
     {heartbeat_time, 0, Type::u16, Access::rw, 2, "Producer heartbeat time, ms"},
     {identity, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {identity, 1, Type::u32, Access::ro, 4, "Vendor-ID"},
@@ -110,6 +124,8 @@ constexpr std::size_t object_count = sizeof objects / sizeof objects[0];
 /// Name in the EDS of an object that has sub-indices.
 constexpr const char* record_name(std::uint16_t index) {
   switch (index) {
+    case error_history:
+      return "Pre-defined error field";
     case store_parameters:
       return "Store parameters";
     case restore_parameters:

@@ -6,12 +6,18 @@
 ///     index  sub  type            access  what
 ///     0x1000   0  UNSIGNED32      const   device type: 0, no standard profile
 ///     0x1001   0  UNSIGNED8       ro      error register: bit 0 where the status record shows a fault
+///     0x1003   0  UNSIGNED8       rw      faults in the list below; 0 written empties it
+///            1-8  UNSIGNED32      ro      newest first: EMCY error code, faults of the status record << 16
 ///     0x1008   0  VISIBLE_STRING  const   manufacturer device name, "flexcomp"
 ///     0x100A   0  VISIBLE_STRING  const   manufacturer software version
-///     0x1010   0  UNSIGNED8       const   1
+///     0x1010   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      "save" (0x65766173): commit what is staged; reads 1
-///     0x1011   0  UNSIGNED8       const   1
+///              2  UNSIGNED32      rw      "save": stores 0x1015 and 0x1017; reads 1, or 0 without memory for them
+///     0x1011   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      "load" (0x64616F6C): restore_defaults; reads 1
+///              2  UNSIGNED32      rw      "load": 0x1015 and 0x1017 as built, from the next reset on; reads as 0x1010:2
+///     0x1014   0  UNSIGNED32      rw      COB-ID of EMCY, 0x80 + node; bit 31: none is sent
+///     0x1015   0  UNSIGNED16      rw      between two of them at least, 100 us
 ///     0x1017   0  UNSIGNED16      rw      producer heartbeat time, ms; 0: none
 ///     0x1018   0  UNSIGNED8       const   4
 ///              1  UNSIGNED32      ro      vendor id (0: none assigned)
@@ -58,8 +64,15 @@
 ///   out in the background (verify, commit and so on) is only there: poll 0x2002:1 until it is not 3.
 /// - CiA 301 lets restored defaults become valid at the next reset; here they do at once, by a bounded motion,
 ///   because between the two a controller would run a set that it can no longer read back.
-/// - SDO is served in pre-operational and operational, expedited and segmented. Block transfer is answered
-///   with 0504_0001, from which a client falls back to segments (CiA 301, 7.2.4.3).
+/// - Communication parameters have 8 bytes of memory of their own, where the integrator gives it: version 1 u8, 0 u8,
+///   0x1017 u16, 0x1015 u16, CRC-16 of these 6 bytes. They hold from the next reset on. 0x1010:1 does not store them: a
+///   set is committed without a word on the network, and the other way round.
+/// - EMCY (CiA 301, 7.2.7) is sent for each fault that appears, and with 0000h for those that disappear, in pre-operational and
+///   operational; after a reset for those that are there. Bytes: error code u16, error register u8, faults of the
+///   status record u16, refusal of the last command u16, 0.
+/// - SDO is served in pre-operational and operational: expedited, segmented, and in blocks with CRC (CiA 301,
+///   7.2.4.3). A sub-block of a download has at most most_segments, and sizes of sub-blocks alternate between
+///   two numbers, so that a frame that comes twice is known.
 #ifndef FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 #define FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 
@@ -75,10 +88,16 @@ namespace canopen {
 // Indices of objects; see the table at the top.
 constexpr std::uint16_t device_type = 0x1000;         ///< CiA 301, 7.5.2.1
 constexpr std::uint16_t error_register = 0x1001;      ///< CiA 301, 7.5.2.2
+constexpr std::uint16_t error_history = 0x1003;       ///< CiA 301, 7.5.2.4
+constexpr std::uint8_t history_length = 8;            ///< errors in it, at most
 constexpr std::uint16_t device_name = 0x1008;         ///< CiA 301, 7.5.2.8
 constexpr std::uint16_t software_version = 0x100A;    ///< CiA 301, 7.5.2.10
 constexpr std::uint16_t store_parameters = 0x1010;    ///< CiA 301, 7.5.2.13
 constexpr std::uint16_t restore_parameters = 0x1011;  ///< CiA 301, 7.5.2.14
+constexpr std::uint16_t emergency = 0x1014;           ///< COB-ID, CiA 301, 7.5.2.17
+constexpr std::uint16_t emergency_inhibit = 0x1015;   ///< CiA 301, 7.5.2.18
+constexpr std::uint8_t communication_parameters = 2;  ///< sub-index of the two: 0x1015 and 0x1017
+constexpr std::uint32_t communication_bytes = 8;      ///< of their memory
 constexpr std::uint16_t heartbeat_time = 0x1017;      ///< CiA 301, 7.5.2.20
 constexpr std::uint16_t identity = 0x1018;            ///< CiA 301, 7.5.2.21
 constexpr std::uint16_t sdo_server = 0x1200;          ///< CiA 301, 7.5.2.33
@@ -100,8 +119,25 @@ constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2
 constexpr std::uint32_t load_signature = 0x64616F6C;  ///< "load", CiA 301 7.5.2.14
 constexpr std::uint32_t product_code = 0x464C5831;    ///< "FLX1"
 
+/// Segments of a sub-block, at most, where flexcomp chooses. With fewer than 64 no number of a segment looks like
+/// the start of an upload (40h) or its answer (43h … 4Fh): a master that polls over the same channel is told apart.
+constexpr std::uint8_t most_segments = 63;
+
+/// Continues CRC-16 CCITT (x^16 + x^12 + x^5 + 1, from 0; CiA 301, 7.2.4.3.16) over more bytes.
+inline std::uint16_t crc16(std::uint16_t crc, const std::uint8_t* bytes, std::uint32_t size) {
+  constexpr std::uint16_t of_nibble[16] = {0x0000, 0x1021, 0x2042, 0x3063, 0x4084, 0x50A5, 0x60C6, 0x70E7,
+                                           0x8108, 0x9129, 0xA14A, 0xB16B, 0xC18C, 0xD1AD, 0xE1CE, 0xF1EF};
+  unsigned c = crc;
+  for (std::uint32_t k = 0; k < size; ++k) {
+    c = ((c << 4U) & 0xFFFFU) ^ of_nibble[(c >> 12U) ^ (bytes[k] >> 4U)];
+    c = ((c << 4U) & 0xFFFFU) ^ of_nibble[(c >> 12U) ^ (bytes[k] & 15U)];
+  }
+  return static_cast<std::uint16_t>(c);
+}
+
 // COB-IDs of the pre-defined connection set (CiA 301, 7.3.5).
 constexpr std::uint16_t nmt_id = 0x000;          ///< NMT commands, from the master
+constexpr std::uint16_t emergency_id = 0x080;    ///< + node
 constexpr std::uint16_t sdo_answer_id = 0x580;   ///< + node, server to client
 constexpr std::uint16_t sdo_request_id = 0x600;  ///< + node, client to server
 constexpr std::uint16_t heartbeat_id = 0x700;    ///< + node
@@ -123,13 +159,37 @@ enum class NmtState : std::uint8_t {
   pre_operational = 127,  ///< SDO is served
 };
 
+/// EMCY error codes (CiA 301, table 26: 50xx hardware of the device, 63xx data set).
+namespace emergency_code {
+constexpr std::uint16_t none = 0x0000;     ///< faults have disappeared; the others stand in bytes 3 and 4
+constexpr std::uint16_t storage = 0x5000;  ///< fault::storage
+constexpr std::uint16_t no_valid_set = 0x6301;    ///< fault::no_valid_set
+constexpr std::uint16_t older_slot = 0x6302;      ///< fault::older_slot
+constexpr std::uint16_t trial_reverted = 0x6303;  ///< fault::trial_reverted
+}  // namespace emergency_code
+
+/// COB-ID bit 31 of 0x1014: no EMCY.
+constexpr std::uint32_t emergency_off = 0x80000000;
+/// Between two EMCY after a reset, 100 us.
+constexpr std::uint16_t emergency_inhibit_default = 1000;
+
+/// Whether a COB-ID is one of those that CiA 301, 7.3.5 keeps for itself.
+constexpr bool is_restricted(std::uint32_t id) {
+  return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5FF) ||
+         (id >= 0x601 && id <= 0x67F) || id >= 0x6E0;
+}
+
 /// SDO abort codes (CiA 301, table 22).
 namespace abort {
 constexpr std::uint32_t none = 0;                     ///< no abort
 constexpr std::uint32_t toggle = 0x05030000;          ///< toggle bit not alternated
 constexpr std::uint32_t timeout = 0x05040000;         ///< SDO protocol timed out
 constexpr std::uint32_t command = 0x05040001;         ///< command specifier not valid or unknown
+constexpr std::uint32_t block_size = 0x05040002;      ///< invalid block size
+constexpr std::uint32_t sequence = 0x05040003;        ///< invalid sequence number, of a block
+constexpr std::uint32_t crc = 0x05040004;             ///< CRC error, of a block transfer
 constexpr std::uint32_t out_of_memory = 0x05040005;   ///< out of memory
+constexpr std::uint32_t access = 0x06010000;          ///< unsupported access to an object
 constexpr std::uint32_t write_only = 0x06010001;      ///< attempt to read a write-only object
 constexpr std::uint32_t read_only = 0x06010002;       ///< attempt to write a read-only object
 constexpr std::uint32_t no_object = 0x06020000;       ///< object does not exist

@@ -178,6 +178,7 @@ class SdoServer {
       out.data[0] = static_cast<std::uint8_t>(toggle_ | ((7U - n) << 1U) | last);
       toggle_ ^= 0x10U;
     } else {
+      object_ = object_of(in);
       return abort(out, 0x05040001);
     }
     return code == 0 || abort(out, code);
@@ -321,6 +322,81 @@ TEST(SdoClient, StopsAServerThatMakesNoSense) {
   });
   SdoClient client(bus.near(), node, milliseconds(300));
   EXPECT_EQ(thrown<SdoAbort>([&] { client.upload({0x2010, 2}); }).code(), co::abort::too_long);
+}
+
+/// A server of one block download or upload, as far as `answer` goes; returns the abort code that the client sends.
+std::uint32_t aborted_by_client(bool upload,
+                                const std::function<std::vector<can_frame>(const can_frame&)>& answer) {
+  std::atomic<std::uint32_t> told{0};
+  Bus bus([&](const can_frame& in, const auto& put) {
+    std::uint32_t code = 0;
+    std::memcpy(&code, in.data + 4, 4);
+    if (in.data[0] == 0x80) told = code;
+    for (const can_frame& f : answer(in)) put(f);
+  });
+  SdoClient client(bus.near(), node, milliseconds(120));
+  try {
+    if (upload) {
+      client.upload({0x2010, 2}, {}, 70);
+    } else {
+      client.download({0x2010, 1}, numbered_bytes(70));
+    }
+    ADD_FAILURE() << "that was no transfer";
+  } catch (const SdoAbort& e) {
+    EXPECT_FALSE(e.by_server()) << e.what();
+  } catch (const SdoTimeout&) {
+  }
+  for (int k = 0; k < 100 && told == 0; ++k) std::this_thread::sleep_for(milliseconds(2));
+  return told;
+}
+
+TEST(SdoClient, StopsABlockServerThatMakesNoSense) {
+  using Frames = std::vector<can_frame>;
+  const auto down = [](unsigned size, unsigned taken, unsigned next) {
+    return [=](const can_frame& in) -> Frames {
+      if ((in.data[0] & 0xE1) == 0xC0) return {frame_of(0x585, {0xA4, 0x10, 0x20, 1, size})};
+      if ((in.data[0] & 0x80) != 0 && in.data[0] != 0x80) return {frame_of(0x585, {0xA2, taken, next})};
+      return {};
+    };
+  };
+  EXPECT_EQ(aborted_by_client(false, down(0, 1, 1)), co::abort::block_size);
+  EXPECT_EQ(aborted_by_client(false, down(128, 1, 1)), co::abort::block_size);
+  EXPECT_EQ(aborted_by_client(false, down(127, 5, 0)), co::abort::block_size);
+  EXPECT_EQ(aborted_by_client(false, down(127, 5, 128)), co::abort::block_size);
+  EXPECT_EQ(aborted_by_client(false, down(127, 0, 127)), co::abort::sequence) << "takes nothing, ever";
+  EXPECT_EQ(aborted_by_client(false, down(127, 11, 127)), co::abort::timeout) << "more than was sent";
+  EXPECT_EQ(aborted_by_client(false, down(127, 10, 127)), co::abort::timeout) << "the end is not answered";
+
+  const auto up = [](unsigned announced, unsigned segments, const can_frame& end) {
+    return [=](const can_frame& in) -> Frames {
+      if (in.data[0] == 0xA4) return {frame_of(0x585, {0xC6, 0x10, 0x20, 2, announced})};
+      if (in.data[0] == 0xA2) return {end};
+      Frames out;
+      for (unsigned k = 1; in.data[0] == 0xA3 && k <= segments; ++k) {
+        out.push_back(frame_of(0x585, {k == segments ? k | 0x80U : k}));
+      }
+      return out;
+    };
+  };
+  EXPECT_EQ(aborted_by_client(true, up(70, 10, frame_of(0x585, {0xC1, 1, 0}))), co::abort::crc);
+  EXPECT_EQ(aborted_by_client(true, up(70, 10, frame_of(0x585, {0xC5, 0, 0}))), co::abort::too_short) << "n";
+  EXPECT_EQ(aborted_by_client(true, up(70, 9, frame_of(0x585, {0xC1, 0, 0}))), co::abort::too_short);
+  EXPECT_EQ(aborted_by_client(true, up(70, 11, frame_of(0x585, {0xC1, 0, 0}))), co::abort::too_long);
+  EXPECT_EQ(aborted_by_client(true, up(70, 10, frame_of(0x585, {0xA1}))), co::abort::timeout);
+}
+
+TEST(SdoClient, AsksForSegmentsWhereAServerHasNoBlocks) {
+  OneObject far;
+  far.value = numbered_bytes(100);
+  Bus bus(std::ref(far.server));
+  SdoClient client(bus.near(), node, milliseconds(1000));
+  EXPECT_EQ(client.upload({0x2010, 2}, {}, 100), far.value);
+  EXPECT_EQ(client.upload({0x2010, 2}, {}, 100), far.value);
+  client.download({0x2010, 1}, numbered_bytes(99));
+  EXPECT_EQ(far.value, numbered_bytes(99));
+  int asked = 0;
+  for (const can_frame& f : bus.seen()) asked += f.data[0] == 0xA4 || f.data[0] == 0xC6 ? 1 : 0;
+  EXPECT_EQ(asked, 1) << "once";
 }
 
 /// The object dictionary of a controller.
