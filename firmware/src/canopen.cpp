@@ -37,13 +37,29 @@ constexpr std::array<Entry, co::object_count> served() {
 }
 constexpr std::array<Entry, co::object_count> dictionary = served();
 
+constexpr bool is_sorted_by_index() {
+  for (std::size_t k = 1; k < co::object_count; ++k) {
+    if (co::objects[k].index < co::objects[k - 1].index) return false;
+  }
+  return true;
+}
+static_assert(is_sorted_by_index(), "find() halves the table");
+
 const Entry* find(std::uint16_t index, std::uint8_t sub, std::uint32_t& code) {
+  std::size_t first = 0;
+  for (std::size_t end = dictionary.size(); first < end;) {
+    const std::size_t middle = (first + end) / 2;
+    if (dictionary[middle].index < index) {
+      first = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
   code = co::abort::no_object;
-  for (const Entry& e : dictionary) {
-    if (e.index != index) continue;
-    if (e.sub == sub) {
+  for (; first < dictionary.size() && dictionary[first].index == index; ++first) {
+    if (dictionary[first].sub == sub) {
       code = co::abort::none;
-      return &e;
+      return &dictionary[first];
     }
     code = co::abort::no_sub_index;
   }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstring>
 #include <functional>
 #include <map>
@@ -65,7 +66,9 @@ class Bus {
     return ends_[0];
   }
   void put(const can_frame& frame) {
-    EXPECT_EQ(::send(ends_[1], &frame, sizeof frame, MSG_NOSIGNAL), static_cast<ssize_t>(sizeof frame));
+    // The client may be gone when the copy of the last answer comes.
+    const ssize_t sent = ::send(ends_[1], &frame, sizeof frame, MSG_NOSIGNAL);
+    EXPECT_TRUE(sent == static_cast<ssize_t>(sizeof frame) || errno == EPIPE);
   }
   std::vector<can_frame> seen() {
     const std::lock_guard<std::mutex> lock(mutex_);
