@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -83,36 +84,41 @@ TargetProgram read_program(const std::string& path, ProgramLanguage language) {
 
 std::string program_text(const TargetProgram& program, const std::vector<ProgramTarget>& corrected) {
   TextEdits edits;
+  // Where a number follows its name without a blank (C.5, X-3), the new one must not become a part of the name.
+  const auto put = [&](const TextSpan& span, std::string number) {
+    const char before = span.begin == 0 ? ' ' : program.text[span.begin - 1];
+    const bool is_name = before == '_' || std::isalnum(static_cast<unsigned char>(before)) != 0;
+    edits.replace(span, is_name && number.front() != '-' ? " " + number : std::move(number));
+  };
   for (std::size_t n = 0; n < corrected.size(); ++n) {
     const ProgramTarget& t = corrected[n];
     const ProgramTarget& old = program.targets[n];
     if (!t.pose) {
-      for (std::size_t j = 0; j < joint_count; ++j)
-        edits.replace(t.numbers[j], six_decimals(degrees(t.q_rad[j])));
+      for (std::size_t j = 0; j < joint_count; ++j) put(t.numbers[j], six_decimals(degrees(t.q_rad[j])));
       continue;
     }
     for (std::size_t k = 0; k < 3; ++k)
-      edits.replace(t.numbers[k], six_decimals(t.position_m[static_cast<Eigen::Index>(k)] * 1e3));
+      put(t.numbers[k], six_decimals(t.position_m[static_cast<Eigen::Index>(k)] * 1e3));
     if (program.language == ProgramLanguage::kuka) {
       const Eigen::Vector3d abc = roll_pitch_yaw(t.orientation.toRotationMatrix()).reverse();
       for (std::size_t k = 0; k < 3; ++k)
-        edits.replace(t.numbers[3 + k], six_decimals(degrees(abc[static_cast<Eigen::Index>(k)])));
+        put(t.numbers[3 + k], six_decimals(degrees(abc[static_cast<Eigen::Index>(k)])));
     } else {
       const Eigen::Quaterniond& q = t.orientation;
       const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
       // 1e-9 of a quaternion is what 1e-6 deg is of an angle.
-      for (std::size_t k = 0; k < 4; ++k) edits.replace(t.numbers[3 + k], fmt::format("{:.9f}", wxyz[k]));
+      for (std::size_t k = 0; k < 4; ++k) put(t.numbers[3 + k], fmt::format("{:.9f}", wxyz[k]));
     }
     // A word that is right stays as it is written.
     if (t.turn && t.turn_number && t.turn != old.turn) {
       const std::string_view word =
           std::string_view(program.text)
               .substr(t.turn_number->begin, t.turn_number->end - t.turn_number->begin);
-      edits.replace(*t.turn_number, turn_word(*t.turn, word));
+      put(*t.turn_number, turn_word(*t.turn, word));
     }
     for (std::size_t k = 0; k < t.quadrant_numbers.size(); ++k) {
       if ((*t.quadrant)[k] != (*old.quadrant)[k])
-        edits.replace(t.quadrant_numbers[k], fmt::format("{}", (*t.quadrant)[k]));
+        put(t.quadrant_numbers[k], fmt::format("{}", (*t.quadrant)[k]));
     }
   }
   return edits.applied_to(program.text);
