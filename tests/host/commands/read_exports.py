@@ -10,7 +10,7 @@ listed = [eds[s][str(k)] for s in ("MandatoryObjects", "OptionalObjects", "Manuf
 assert len(listed) == len(set(listed)) >= 14, listed
 for index in listed:
     section = eds[index[2:]]
-    assert section["ParameterName"] and int(section["ObjectType"], 0) in (2, 7, 9), index
+    assert section["ParameterName"] and int(section["ObjectType"], 0) in (2, 7, 8, 9), index
     if int(section["ObjectType"], 0) == 9:
         subs = [s for s in eds.sections() if s.startswith(index[2:] + "sub")]
         assert len(subs) == int(section["SubNumber"]), index
