@@ -77,7 +77,8 @@ std::vector<std::string> beyond_capability(const wire::Capability& capability,
 std::uint32_t next_sequence(ControllerClient& client) {
   const wire::Status now = client.status();
   // Serial number arithmetic (RFC 1982); 0 means none.
-  const bool previous_is_newer = now.previous_sequence != 0 && now.previous_sequence - now.active_sequence < 0x80000000U;
+  const bool previous_is_newer =
+      now.previous_sequence != 0 && now.previous_sequence - now.active_sequence < 0x80000000U;
   const std::uint32_t next = (previous_is_newer ? now.previous_sequence : now.active_sequence) + 1;
   return next != 0 ? next : 1;
 }
