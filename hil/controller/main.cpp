@@ -26,7 +26,7 @@
 
 namespace {
 
-using namespace flexcomp;
+using namespace flexcomp;  // NOLINT(google-build-using-namespace)
 
 constexpr std::string_view usage =
     "usage: flexcomp-controller --robot R.yaml --store FILE [options]\n"

@@ -57,13 +57,13 @@ void keep_alive(int socket) {
 }  // namespace
 
 std::uint32_t now_ms() {
-  using namespace std::chrono;
+  using namespace std::chrono;  // NOLINT(google-build-using-namespace)
   return static_cast<std::uint32_t>(
       duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count());
 }
 
 std::uint32_t now_us() {
-  using namespace std::chrono;
+  using namespace std::chrono;  // NOLINT(google-build-using-namespace)
   return static_cast<std::uint32_t>(
       duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
 }

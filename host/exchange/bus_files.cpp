@@ -119,7 +119,7 @@ std::vector<Field> named(std::vector<Field> fields, const std::vector<std::strin
 /// "name, name|unit"
 void add(std::vector<std::string>& names, std::string_view list) {
   constexpr std::string_view comma = ", ";
-  for (auto end = list.find(comma); end != list.npos; end = list.find(comma)) {
+  for (auto end = list.find(comma); end != std::string_view::npos; end = list.find(comma)) {
     names.emplace_back(list.substr(0, end));
     list.remove_prefix(end + comma.size());
   }

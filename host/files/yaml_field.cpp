@@ -66,8 +66,8 @@ class FirstNode : public YAML::EventHandler {
 
 }  // namespace
 
-YamlField::YamlField(YAML::Node node, std::string file, std::string path, std::size_t line)
-    : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)), line_(line) {}
+YamlField::YamlField(const YAML::Node& node, std::string file, std::string path, std::size_t line)
+    : node_(node), file_(std::move(file)), path_(std::move(path)), line_(line) {}
 
 YamlField YamlField::load(const std::string& path) { return parse(read_file(path), path); }
 

@@ -56,7 +56,7 @@ class YamlField {
   double number_or(const std::string& key, const Unit& unit, double otherwise) const;
 
  private:
-  YamlField(YAML::Node node, std::string file, std::string path, std::size_t line);
+  YamlField(const YAML::Node& node, std::string file, std::string path, std::size_t line);
 
   YAML::Node node_;
   std::string file_;

@@ -379,7 +379,7 @@ TEST_F(CanopenBlock, ContinuesWhenTheQueueHasRoom) {
 TEST_F(CanopenBlock, CopiesAreAnsweredAgain) {
   const Bytes image = make_image(arm.robot, 5);
   const auto twice = [this](const BlockFrame& f) {
-    const auto first = ask(f);
+    auto first = ask(f);
     const auto second = ask(f);
     EXPECT_EQ(first, second);
     return first;

@@ -16,6 +16,7 @@ using namespace flexcomp::host;
 /// What makes each term, in an order that does not depend on that of the links in the file.
 auto sorted(const std::vector<flexcomp::Term<double>>& terms) {
   std::vector<std::tuple<unsigned, unsigned, unsigned, unsigned, unsigned, double, double>> all;
+  all.reserve(terms.size());
   for (const auto& t : terms) {
     all.emplace_back(t.place.body, t.place.slot, static_cast<unsigned>(t.basis), t.joint,
                      static_cast<unsigned>(t.effect), t.coefficient, t.argument);

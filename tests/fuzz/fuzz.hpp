@@ -61,7 +61,7 @@ class Input {
   /// Up to so many bytes.
   Bytes bytes(std::size_t count) {
     const std::size_t size = count < left_ ? count : left_;
-    const Bytes out(at_, at_ + size);
+    Bytes out(at_, at_ + size);
     at_ += size;
     left_ -= size;
     return out;

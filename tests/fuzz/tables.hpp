@@ -70,6 +70,7 @@ inline flexcomp::host::LogMap log_options(unsigned what) {
   return map;
 }
 
+// NOLINTBEGIN(bugprone-suspicious-missing-comma): long lines are broken.
 inline const std::string point_lists[] = {
     "Units: Millimeters, Degrees\nCollection::Group::Point X Y Z\nA::G::P1 100.5 200 300\nA::G::P2 101 201 "
     "301.25\n",
@@ -92,5 +93,6 @@ inline const std::string robot_logs[] = {
     "05.4,11,20,30,40,50,60,1\n",
     "Pose,Time,A1,A2,A3,A4,A5,A6,temp_c\nP1,2026-03-01T12:30:05Z,10,20,30,40,50,60,25\n",
     "% log\nname joint1_deg joint2_deg joint3_deg joint4_deg joint5_deg joint6_deg\nP1 1 2 3 4 5 6\n"};
+// NOLINTEND(bugprone-suspicious-missing-comma)
 
 }  // namespace fuzz

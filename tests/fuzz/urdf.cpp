@@ -88,10 +88,12 @@ std::vector<Bytes> seeds() {
   std::string text = "<robot name=\"r\"><link name=\"base_link\"/>";
   for (int k = 1; k <= 6; ++k) {
     const std::string n = std::to_string(k);
+    // NOLINTBEGIN(performance-inefficient-string-concatenation)
     text += "<link name=\"l" + n + "\"/><joint name=\"j" + n + "\" type=\"revolute\"><origin xyz=\"0." + n +
             " 0 0.1\" rpy=\"" + (k % 2 == 0 ? "1.5707963267948966" : "0") + " 0 0\"/><parent link=\"" +
             (k == 1 ? "base_link" : "l" + std::to_string(k - 1)) + "\"/><child link=\"l" + n +
             "\"/><axis xyz=\"0 0 1\"/><limit lower=\"-2\" upper=\"2\" velocity=\"1\"/></joint>";
+    // NOLINTEND(performance-inefficient-string-concatenation)
   }
   const std::string tool =
       "<link name=\"tool0\"/><joint name=\"f\" type=\"fixed\"><origin xyz=\"0 0 0.1\"/><parent "
