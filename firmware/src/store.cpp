@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "flexcomp_firmware/store.hpp"
 
+#include <array>
 #include <cstring>
 
 #include "flexcomp/crc32.hpp"
@@ -185,6 +186,7 @@ StorageResult Store::add_seal(Set& set) {
 }
 
 void Store::read_marks(unsigned slot) {
+  static_assert(std::tuple_size<decltype(Marks::generation)>::value == most_marks, "a place for each mark");
   Marks& marks = marks_[slot];
   marks = Marks{};
   for (unsigned k = 0; k < most_marks; ++k) {

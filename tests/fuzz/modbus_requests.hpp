@@ -113,6 +113,22 @@ inline Bytes modbus_push(const Bytes& before, unsigned image, unsigned sequence,
   return out.out;
 }
 
+/// Operations that the targets of both lines have under one number.
+constexpr unsigned settle = 5, steps = 6, power = 10;
+
+/// A push, and then each command once, asked for by requests that begin with `asked`; the power goes after it.
+inline void add_command_seeds(const Bytes& before, const Bytes& asked, std::vector<Bytes>& all) {
+  for (unsigned command = 2; command < 9; ++command) {
+    Output out;
+    out.u8(command % 3)
+        .u8(steps)
+        .u8(1)
+        .add(modbus_push(before, command % image_count, 9, command < 5 ? command : 3));
+    out.u8(settle).u8(steps).u8(20).add(asked).u8(6).u16(0).u8(command).u8(settle).u8(power);
+    all.push_back(out.out);
+  }
+}
+
 /// The kinds of requests of modbus_request(), one each.
 inline std::vector<Bytes> modbus_samples() {
   std::vector<Bytes> all;

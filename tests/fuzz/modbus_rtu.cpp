@@ -6,8 +6,8 @@
 namespace fuzz::modbus_rtu_target {
 namespace {
 
-constexpr unsigned frame = 0, raw = 2, line_poll = 3, store_poll = 4, settle = 5, steps = 6, line_error = 7,
-                   pieces = 8, storage = 9, power = 10, operations = 11;
+constexpr unsigned frame = 0, raw = 2, line_poll = 3, store_poll = 4, line_error = 7, pieces = 8, storage = 9,
+                   operations = 11;
 
 unsigned unit(unsigned choice) { return choice < 160 ? unit_id : choice < 200 ? 0 : choice; }
 
@@ -112,15 +112,7 @@ std::vector<Bytes> seeds() {
                         .out);
   }
   all.push_back(many.out);
-  for (unsigned command = 2; command < 9; ++command) {
-    Output out;
-    out.u8(command % 3)
-        .u8(steps)
-        .u8(1)
-        .add(modbus_push(before, command % image_count, 9, command < 5 ? command : 3));
-    out.u8(settle).u8(steps).u8(20).add(before).u8(6).u16(0).u8(command).u8(settle).u8(power);
-    all.push_back(out.out);
-  }
+  add_command_seeds(before, before, all);
   all.push_back(Output()
                     .u8(0)
                     .u8(raw)

@@ -6,8 +6,8 @@
 namespace fuzz::modbus_tcp_target {
 namespace {
 
-constexpr unsigned request = 0, raw = 2, portions = 3, store_poll = 4, settle = 5, steps = 6, close = 7,
-                   open = 8, storage = 9, power = 10, operations = 11;
+constexpr unsigned request = 0, raw = 2, portions = 3, store_poll = 4, close = 7, open = 8, storage = 9,
+                   operations = 11;
 
 /// A frame around a PDU whose header may be wrong by a byte.
 Bytes frame_of(Input& input) {
@@ -104,15 +104,7 @@ std::vector<Bytes> seeds() {
       all.push_back(Output().u8(0).u8(portions).u8(count).u8(count % 9).u8(count).add(sample).u8(close).out);
   }
   all.push_back(many.out);
-  for (unsigned command = 2; command < 9; ++command) {
-    Output out;
-    out.u8(command % 3)
-        .u8(steps)
-        .u8(1)
-        .add(modbus_push(before, command % image_count, 9, command < 5 ? command : 3));
-    out.u8(settle).u8(steps).u8(20).add(other).u8(6).u16(0).u8(command).u8(settle).u8(power);
-    all.push_back(out.out);
-  }
+  add_command_seeds(before, other, all);
   all.push_back(Output()
                     .u8(0)
                     .add(modbus_push(before, 5, 3, 2))

@@ -214,6 +214,16 @@ def set_of(status):
     return status["active"]["sequence"], status["active"]["crc"], status["active"]["bytes"]
 
 
+def crc16(data):
+    """Modbus over Serial Line V1.02, 6.2.2, bit by bit."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+    return struct.pack("<H", crc)
+
+
 def with_crc(image):
     return image[:-4] + struct.pack("<I", zlib.crc32(image[:-4]))
 

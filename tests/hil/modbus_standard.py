@@ -17,20 +17,11 @@ import sys
 import threading
 import time
 
-from buses import (BAUD, CALIBRATION, CONTROLLER, FLEXCOMP, RTU_UNIT, SLACK, SOURCE, TCP_UNIT, check, flexcomp, passed, read,
+from buses import (BAUD, CALIBRATION, CONTROLLER, FLEXCOMP, RTU_UNIT, SLACK, SOURCE, TCP_UNIT, check, crc16, flexcomp, passed, read,
                    write)
 
 PLACES = 16
 SERVER_ID = 0xF1
-
-
-def crc16(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
-    return struct.pack("<H", crc)
 
 
 class Server:

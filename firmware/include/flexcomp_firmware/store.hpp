@@ -21,9 +21,9 @@
 ///
 /// - a commit erases the slot that is not in use, announces its generation there, writes the image, reads it back, and seals it
 ///   three times. The first seal decides, and the announcement before it is there to be seen;
-/// - a start that finds fewer seals than three adds two before it trusts the set; a start that finds an announcement without a seal, or a seal
-///   that it does not trust, voids it by three marks in the other slot before anything is in use. No later start decides otherwise:
-///   two of either are whole;
+/// - a start that finds fewer seals than three adds two before it trusts the set; a start that finds an announcement
+///   without a seal, or a seal that it does not trust, voids it by three marks in the other slot before anything is in use.
+///   No later start decides otherwise: two of either are whole;
 /// - one mark voids no set with two seals, so that a slot in use is erased only after three;
 /// - of two slots the one that marks void is erased before the one with the marks;
 /// - the set in use is read again before the other one is erased.
@@ -166,7 +166,7 @@ class Store {
     announce,       ///< the generation, before the image
     write,          ///< the image
     compare,        ///< read back
-    seal,           ///< commit or confirm: two seals
+    seal,           ///< commit or confirm: three seals
     void_incoming,  ///< commit or confirm: marks, where writing a seal failed
     drop_incoming,  ///< the same: erase it
     await_confirm,  ///< confirm: until the cycle has ended the trial

@@ -11,7 +11,7 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 import buses  # noqa: E402
-from buses import check  # noqa: E402
+from buses import check, crc16  # noqa: E402
 
 # How long something may take that takes milliseconds, on a machine that is busy with something else.
 PATIENCE = 30.0
@@ -48,16 +48,6 @@ class Console:
                 return report
             check(time.monotonic() < end, f"waited for {what}", report)
             time.sleep(0.02)
-
-
-def crc16(data):
-    """Modbus over Serial Line V1.02, 6.2.2, bit by bit."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
-    return struct.pack("<H", crc)
 
 
 class Master:
