@@ -13,12 +13,18 @@
 ///     48  SHA-256 of the robot's name, 32 bytes          type 2, table, 8 + 8 n bytes (curve: rows 0):
 ///     80  u16 terms, u16 tables                             u16 rows, u16 columns
 ///     84  u32 table values                                  u8 row covariate, u8 row joint,
-///     88  u32 flags (0), u32 0                              u8 column covariate, u8 column joint
-///                                                           f64 values (term.hpp, Table)
+///     88  u32 flags (0)                                     u8 column covariate, u8 column joint
+///     92  u8  joints (0: six), 3 bytes 0                    f64 values (term.hpp, Table)
 ///                                                        tables come before terms
-///     last 4 bytes: CRC-32 (IEEE 802.3) of all before
+///     last 4 bytes:                                      type 3, unit, 32 bytes, the first record where there is one:
+///         CRC-32 (IEEE 802.3) of all before                 SHA-256 of the unit's serial number
+///                                                        type 4, signature, 84 bytes, the last one (signature.hpp)
 ///
 /// The argument of a link-weight term is the number of its distal joint, from 0.
+///
+/// Schema 1.1 added the number of joints and the types 3 and 4; an image without them has the minor number 0 and is what
+/// it was. Coupling and kinds of joints are the robot's: the nominal hash binds a set to them. What a set can do at
+/// most is calculated by the controller (certificate_record.hpp) and not believed.
 #ifndef FLEXCOMP_IMAGE_HPP
 #define FLEXCOMP_IMAGE_HPP
 
@@ -36,16 +42,20 @@ namespace flexcomp {
 
 /// Constants of the layout; see the table at the top.
 namespace image {
-constexpr std::uint8_t schema_major = 1;           ///< of what this build writes and reads
-constexpr std::uint8_t schema_minor = 0;           ///< of what this build writes
-constexpr std::size_t header_bytes = 96;           ///< size of the header
-constexpr std::size_t crc_bytes = 4;               ///< size of the CRC-32 at the end
-constexpr std::size_t record_head_bytes = 4;       ///< type and length of a record
-constexpr std::size_t term_bytes = 28;             ///< a term record without its head
-constexpr std::size_t table_head_bytes = 8;        ///< a table record before its values, without its head
+constexpr std::uint8_t schema_major = 1;      ///< of what this build writes and reads
+constexpr std::uint8_t schema_minor = 1;      ///< of what this build writes, 0 where nothing of 1.1 is in it
+constexpr std::size_t header_bytes = 96;      ///< size of the header
+constexpr std::size_t crc_bytes = 4;          ///< size of the CRC-32 at the end
+constexpr std::size_t record_head_bytes = 4;  ///< type and length of a record
+constexpr std::size_t term_bytes = 28;        ///< a term record without its head
+constexpr std::size_t table_head_bytes = 8;   ///< a table record before its values, without its head
 constexpr std::size_t max_table_values = 8190;     ///< limit of a record's 16-bit length
 constexpr std::uint16_t record_term = 1;           ///< type of a term record
 constexpr std::uint16_t record_table = 2;          ///< type of a table record
+constexpr std::uint16_t record_unit = 3;           ///< type of the record that binds a set to one unit
+constexpr std::uint16_t record_signature = 4;      ///< type of the signature record
+constexpr std::size_t unit_bytes = 32;             ///< a unit record without its head
+constexpr std::size_t signature_bytes = 84;        ///< a signature record without its head
 constexpr std::uint16_t optional_record = 0x8000;  ///< bit of a type: may be skipped if unknown
 }  // namespace image
 
@@ -60,12 +70,22 @@ struct ImageHeader {
   std::uint16_t terms = 0;                          ///< number of term records
   std::uint16_t tables = 0;                         ///< number of table records
   std::uint32_t values = 0;                         ///< sum of the tables' values
+  Sha256Digest
+      unit_hash{};  ///< of the serial number that the set is bound to; zeros: none. Not read by read_header()
 };
 
-/// Size of the image of a list, bytes.
+/// True where a hash names something: it is not all zeros.
+inline bool is_given(const Sha256Digest& hash) {
+  unsigned any = 0;
+  for (const std::uint8_t byte : hash) any |= byte;
+  return any != 0;
+}
+
+/// Size of the image of a list, bytes; `bound`: with a unit record.
 template <class S>
-inline std::size_t image_size(const TermList<S>& list) {
+inline std::size_t image_size(const TermList<S>& list, bool bound = false) {
   std::size_t size = image::header_bytes + image::crc_bytes;
+  if (bound) size += image::record_head_bytes + image::unit_bytes;
   for (std::size_t k = 0; k < list.table_count; ++k) {
     size += image::record_head_bytes + image::table_head_bytes +
             8 * static_cast<std::size_t>(list.tables[k].size);
@@ -74,12 +94,13 @@ inline std::size_t image_size(const TermList<S>& list) {
 }
 
 /// Writes the image of a list into `out`; returns its size, or 0 where it exceeds `capacity`, a count
-/// overflows or a table exceeds the list's values. Of the header only sequence, nominal_hash and name_hash
-/// are read.
+/// overflows or a table exceeds the list's values. Of the header only sequence, nominal_hash, name_hash and
+/// unit_hash are read.
 template <class S>
 inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& header, std::uint8_t* out,
                                 std::size_t capacity) {
-  const std::size_t size = image_size(list);
+  const bool is_bound = is_given(header.unit_hash);
+  const std::size_t size = image_size(list, is_bound);
   if (size > capacity || list.count > 0xFFFF || list.table_count > 0xFFFF) return 0;
   for (std::size_t k = 0; k < list.table_count; ++k) {
     if (!has_values(list, list.tables[k]) || list.tables[k].size > image::max_table_values) return 0;
@@ -90,7 +111,7 @@ inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& head
   out[2] = 'X';
   out[3] = 'C';
   out[4] = image::schema_major;
-  out[5] = image::schema_minor;
+  out[5] = is_bound ? image::schema_minor : 0;
   store_u16(out + 6, static_cast<std::uint16_t>(image::header_bytes));
   store_u32(out + 8, static_cast<std::uint32_t>(size));
   store_u32(out + 12, header.sequence);
@@ -101,6 +122,12 @@ inline std::size_t encode_image(const TermList<S>& list, const ImageHeader& head
   store_u16(out + 80, static_cast<std::uint16_t>(list.count));
   store_u16(out + 82, static_cast<std::uint16_t>(list.table_count));
   std::uint8_t* p = out + image::header_bytes;
+  if (is_bound) {
+    store_u16(p, image::record_unit);
+    store_u16(p + 2, static_cast<std::uint16_t>(image::unit_bytes));
+    p += image::record_head_bytes;
+    for (const std::uint8_t byte : header.unit_hash) *p++ = byte;
+  }
   std::uint32_t values = 0;
   for (std::size_t k = 0; k < list.table_count; ++k) {
     const Table& t = list.tables[k];
@@ -197,6 +224,8 @@ struct ImageCursor {
   std::size_t terms = 0;                 ///< so far
   std::size_t tables = 0;                ///< so far
   std::size_t values = 0;                ///< of all tables so far
+  std::size_t unit = 0;                  ///< offset of the hash that the unit record holds; 0: none so far
+  std::size_t signature = 0;             ///< offset of what the signature record holds; 0: none so far
 };
 
 /// True where all records of an image of `size` bytes have been read.
@@ -256,7 +285,29 @@ inline Refusal visit_record(const std::uint8_t* bytes, std::size_t size, ImageCu
     ++cursor.tables;
     return visitor.table(t, body + image::table_head_bytes);
   }
+  if (type == image::record_unit) {
+    if (length != image::unit_bytes || body != bytes + image::header_bytes + image::record_head_bytes)
+      return Refusal::bad_length;
+    cursor.unit = static_cast<std::size_t>(body - bytes);
+    return Refusal::none;
+  }
+  if (type == image::record_signature) {
+    if (length != image::signature_bytes || !at_end(cursor, size)) return Refusal::bad_length;
+    cursor.signature = static_cast<std::size_t>(body - bytes);
+    return Refusal::none;
+  }
   return (type & image::optional_record) == 0 ? Refusal::unknown_record : Refusal::none;
+}
+
+/// Whether an image whose records were read is for this unit: it is where it names none.
+inline Refusal check_unit(const std::uint8_t* bytes, const ImageCursor& cursor,
+                          const Sha256Digest& unit_hash) {
+  if (cursor.unit == 0) return Refusal::none;
+  unsigned other = is_given(unit_hash) ? 0U : 1U;
+  for (std::size_t k = 0; k < image::unit_bytes; ++k) {
+    other |= static_cast<unsigned>(bytes[cursor.unit + k] ^ unit_hash[k]);
+  }
+  return other == 0 ? Refusal::none : Refusal::wrong_unit;
 }
 
 /// Whether the records that were read are as many as the header says.

@@ -45,6 +45,7 @@ struct NominalRobot {
   std::array<double, 3> payload_com_m{{0, 0, 0}};    ///< its centre of mass in F6
   double reference_temperature_c = 20;               ///< of the nominal lengths
   Sha256Digest name_hash{};                          ///< SHA-256 of the robot's name (UTF-8)
+  Sha256Digest unit_hash{};  ///< SHA-256 of the unit's serial number (UTF-8); zeros: it has none
 };
 
 /// Nominal hash: SHA-256 over "flexcomp-nominal-1", a zero byte, N as one byte, then per link theta, d, a,
@@ -67,7 +68,7 @@ inline Sha256Digest nominal_hash(const NominalRobot<N>& robot) {
   return sha.finish();
 }
 
-/// SHA-256 of a name given as `size` bytes.
+/// SHA-256 of a name or a serial number given as `size` bytes.
 inline Sha256Digest name_hash(const char* name, std::size_t size) {
   Sha256 sha;
   for (std::size_t i = 0; i < size; ++i) sha.update(static_cast<std::uint8_t>(name[i]));

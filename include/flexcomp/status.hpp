@@ -36,6 +36,12 @@ enum class Refusal : std::uint8_t {
   not_allowed_covariate = 21,  ///< follows time or speed
   too_costly = 22,             ///< a step would take too many instructions; the detail is their number
   sequence_too_far = 23,       ///< a sequence number more than 65,536 above the active one
+  // Who may (signature.hpp).
+  wrong_unit = 24,       ///< made for the unit with another serial number
+  not_signed = 25,       ///< without a signature, or not bound to a unit, where only signed sets are accepted
+  unknown_key = 26,      ///< signed with a key that is not trusted
+  wrong_signature = 27,  ///< the signature does not belong to these bytes
+  counter_used = 28,     ///< a counter not above the highest one that was accepted: sent before, or older
 };
 
 /// Result of one joint command (docs/compensation.md, C17). Numbers are on the wire: add, never change.
@@ -153,6 +159,16 @@ inline const char* text(Refusal r) {
       return "the image takes more instructions in a control cycle than are allowed";
     case Refusal::sequence_too_far:
       return "the sequence number is more than 65,536 above that of the active set";
+    case Refusal::wrong_unit:
+      return "it is for another unit: the serial number differs";
+    case Refusal::not_signed:
+      return "the controller accepts only what is signed";
+    case Refusal::unknown_key:
+      return "it is signed with a key that the controller does not trust";
+    case Refusal::wrong_signature:
+      return "the signature is wrong";
+    case Refusal::counter_used:
+      return "its counter is not above the highest one that the controller has accepted";
   }
   return "unknown refusal";
 }

@@ -23,7 +23,7 @@
 ///              1  UNSIGNED32      ro      vendor id (0: none assigned)
 ///              2  UNSIGNED32      ro      product code
 ///              3  UNSIGNED32      ro      revision: firmware (major << 16 | minor << 8 | patch)
-///              4  UNSIGNED32      ro      serial number: the first four bytes of the name hash
+///              4  UNSIGNED32      ro      serial number: the first four bytes of its hash, without one of the name's
 ///     0x1200   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      ro      COB-ID of requests, 0x600 + node
 ///              2  UNSIGNED32      ro      COB-ID of answers, 0x580 + node
@@ -44,6 +44,7 @@
 ///              2  REAL32          ro      size of the set at the tool, at most, mm
 ///              3  REAL32          ro      the same, orientation, deg
 ///            4-9  REAL32          ro      deflection of joint 1 … 6, at most, deg
+///     0x2006   0  DOMAIN          ro      unit record (unit_record.hpp)
 ///     0x2010   0  UNSIGNED8       const   2
 ///              1  DOMAIN          wo      image into staging
 ///              2  DOMAIN          ro      active image, byte for byte
@@ -231,6 +232,7 @@ inline std::uint32_t abort_code(Refusal refusal) {
     case Refusal::bad_place:
     case Refusal::mounting:
     case Refusal::not_allowed_covariate:
+    case Refusal::wrong_unit:
       return abort::incompatible;
     case Refusal::bad_value:
       return abort::value;
@@ -246,6 +248,11 @@ inline std::uint32_t abort_code(Refusal refusal) {
       return abort::value_too_high;
     case Refusal::stale_sequence:
       return abort::value_too_low;
+    case Refusal::not_signed:
+    case Refusal::unknown_key:
+    case Refusal::wrong_signature:
+    case Refusal::counter_used:
+      return abort::local_control;
   }
   return abort::general;
 }

@@ -15,7 +15,7 @@
 ///       4 u16 bytes of the scalar: 4, 8             4 u16 refusal of the last command (flexcomp::Refusal)
 ///       6 u16 image schema (major << 8 | minor)     6 u16 faults (bits, namespace fault)
 ///       8 u32 bases, bit 1 << id                    8 u32 detail of the refusal or answer
-///      12 u32 flags, 0                             12 u16 slot of the active set: 0, 1, or 0xFFFF for none
+///      12 u32 flags (bits, capability_flag)         12 u16 slot of the active set: 0, 1, or 0xFFFF for none
 ///      16 u16 terms that are not constant          14 u16 1: the control cycle runs what is requested
 ///      18 u16 tables                               16 u32 sequence of the active set, 0 for none
 ///      20 u32 table values                         20 u32 bytes of the active image
@@ -45,6 +45,16 @@
 /// A refusal by admission (Refusal::too_large and after) has in its detail the index of the term among those that are not
 /// constant, from 0, in the order of the image; Refusal::too_costly the number of instructions.
 ///
+/// rollback (but out of a trial) and restore_defaults over a bus need one of three: the integrator's word; where no key is
+/// trusted (unit_record.hpp) an unlock; where one is, a signed command (signature.hpp): begin, its bytes and verify as for a
+/// set, and then the command itself from the same client, before any other. An unlock: the command `unlock` with argument
+/// 0, whose answer has a number in `detail`, the command `unlock` with that number as its argument, and then the command
+/// itself, from the same client within 10 s. What is missing is answered `not_authorised`.
+///
+/// Another client's begin is answered `busy` while the bytes of a transfer go on arriving. It takes over from one that has been
+/// silent for 3 s or has gone on for the time of an abandoned transfer; who is told to wait comes before whom he
+/// waits for.
+///
 /// Taking in a set: begin(bytes) -> the bytes -> verify -> commit (or commit_trial, then confirm). verify and the
 /// commands that write to non-volatile memory (commit, commit_trial, confirm, rollback, restore_defaults) are answered
 /// when they are accepted and then run in the background: the state is `working` until they end, and answer,
@@ -64,7 +74,7 @@ namespace flexcomp {
 namespace wire {
 
 /// Version of this protocol. A host refuses another major number; a higher minor number only adds.
-constexpr std::uint16_t protocol_version = 0x0100;
+constexpr std::uint16_t protocol_version = 0x0101;
 /// Joints of an arm in the records.
 constexpr std::size_t joints = 6;
 
@@ -88,6 +98,7 @@ enum class Command : std::uint16_t {
   rollback = 6,      ///< activates the set in the other slot, or ends the trial; the slot left is erased
   abort = 7,         ///< discards what is staged
   restore_defaults = 8,  ///< erases both slots; commands are passed through from then on
+  unlock = 9,            ///< of what destroys sets; argument: 0, then the number in `detail`
 };
 
 /// How the last command ended. Numbers are on the wire: add, never change.
@@ -96,7 +107,7 @@ enum class Answer : std::uint16_t {
   refused = 1,      ///< the image was refused; `refusal` says why
   wrong_state = 2,  ///< not in this state of the store
   busy = 3,  ///< transfer of another client, write in progress, or the cycle has not taken the last set yet
-  not_authorised = 4,   ///< by local control
+  not_authorised = 4,   ///< by local control, or without unlock or signature
   storage_failed = 5,   ///< non-volatile memory could not be erased, written or read back
   incomplete = 6,       ///< fewer bytes were staged than announced; detail: how many
   no_previous = 7,      ///< nothing to roll back to
@@ -113,6 +124,12 @@ constexpr std::uint16_t storage = 4;       ///< non-volatile memory failed to re
 constexpr std::uint16_t trial_reverted = 8;  ///< a set on trial was not confirmed in time
 }  // namespace fault
 
+/// Bits of the capability record's `flags`.
+namespace capability_flag {
+constexpr std::uint32_t unit =
+    1;  ///< there is a unit record, and rollback and restore_defaults are not for everybody
+}  // namespace capability_flag
+
 /// Slot of a set that is in none.
 constexpr std::uint16_t no_slot = 0xFFFF;
 
@@ -123,7 +140,7 @@ struct Capability {
   std::uint16_t scalar_bytes = 0;               ///< 4 float, 8 double
   std::uint16_t schema = 0;                     ///< of images, major << 8 | minor
   std::uint32_t bases = 0;                      ///< bit 1 << id of Basis
-  std::uint32_t flags = 0;                      ///< 0
+  std::uint32_t flags = 0;                      ///< bits of namespace capability_flag
   std::uint16_t terms = 0;                      ///< that are not constant
   std::uint16_t tables = 0;                     ///< most tables
   std::uint32_t values = 0;                     ///< most table values
