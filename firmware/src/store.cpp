@@ -443,7 +443,7 @@ bool Store::must_wait(Origin origin) {
   if (waiting_ != nobody && passed(waiting_ms_) >= precedence_ms) waiting_ = nobody;
   const bool is_free = state_ == StoreState::idle || owns(origin);
   const bool has_stalled =
-      !touched_ && (passed(touched_ms_) >= silent_ms || passed(began_ms_) >= settings_.staging_timeout_ms);
+      (!touched_ && passed(touched_ms_) >= silent_ms) || passed(began_ms_) >= settings_.staging_timeout_ms;
   if (is_free ? waiting_ != nobody && waiting_ != origin && origin == last_owner_ : !has_stalled) {
     if (is_free) {
       release();
