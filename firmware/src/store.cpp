@@ -236,9 +236,8 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       is_command_ = check_signature_ != nullptr && purpose_ == Purpose::verify &&
                     looks_like_command(image, check_bytes_);
       if (is_command_) {
-        r = begin_signature();
         check_ = Check::signature;
-        return r != Refusal::none;
+        return check_signature_(*this, true, r);
       }
       r = read_header(image, check_bytes_, header_);
       if (r == Refusal::none && header_.joints != joints) r = Refusal::wrong_nominal;
@@ -257,15 +256,14 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       r = check_crc_ != load_u32(image + end) ? Refusal::checksum
                                               : check_binding(header_, nominal_hash_, robot_.name_hash);
       if (r == Refusal::none) r = check_unit(image, check_bytes_, robot_.unit_hash);
-      if (r == Refusal::none) r = begin_signature();
-      if (r != Refusal::none) return true;
+      if (r != Refusal::none || (check_signature_ != nullptr && check_signature_(*this, true, r))) return true;
       begin_model(robot_, model);
       cursor_ = {};
       check_ = check_signature_ != nullptr ? Check::signature : Check::records;
       return false;
     }
     case Check::signature:
-      if (!check_signature_(*this, r)) return false;
+      if (!check_signature_(*this, false, r)) return false;
       check_ = Check::records;
       return r != Refusal::none || is_command_;
     case Check::records:
@@ -333,12 +331,15 @@ void Store::set_trust(const Trust& trust) {
   check_signature_ = trust.count != 0 ? check_signature : nullptr;
 }
 
-bool Store::check_signature(Store& store, Refusal& r) { return store.signature_.advance(store.trust_, r); }
+bool Store::check_signature(Store& store, bool begins, Refusal& r) {
+  if (!begins) return store.signature_.advance(store.trust_, r);
+  r = store.begin_signature();
+  return r != Refusal::none;
+}
 
 /// Whether what is in the staging memory has a signature that could count here: bound to this unit, by a trusted key, with a counter
 /// that was not used.
 Refusal Store::begin_signature() {
-  if (check_signature_ == nullptr) return Refusal::none;
   const std::uint8_t* bytes = staging_.data();
   const std::uint8_t* id = nullptr;
   std::uint32_t end = signing::command_signature;

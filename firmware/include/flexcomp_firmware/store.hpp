@@ -157,9 +157,10 @@ class Store {
   enum class Purpose : std::uint8_t { start, verify, commit, rollback };
   void begin_check(std::uint32_t size, std::uint32_t index);
   bool check_slice(Refusal& r, std::uint32_t& detail);
-  /// Null without set_trust(): what it needs is then not linked.
-  bool (*check_signature_)(Store& store, Refusal& r) = nullptr;
-  static bool check_signature(Store& store, Refusal& r);
+  /// Begins the check of a signature, or goes on with it; true where it has ended. Null without set_trust(): what it needs is
+  /// then not linked.
+  bool (*check_signature_)(Store& store, bool begins, Refusal& r) = nullptr;
+  static bool check_signature(Store& store, bool begins, Refusal& r);
   Refusal begin_signature();
   void checked(Refusal r, std::uint32_t detail);
   void begin_commit();
