@@ -7,7 +7,7 @@ namespace flexcomp {
 namespace firmware {
 
 namespace {
-constexpr std::uint32_t hashed_at_once = 192;  ///< bytes: three compressions
+constexpr std::uint32_t hashed_at_once = 64;   ///< bytes: one compression
 constexpr std::uint32_t most_calls = 1000000;  ///< of a function that needs more time
 }  // namespace
 
