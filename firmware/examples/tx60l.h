@@ -22,6 +22,7 @@ static const flexcomp_robot staubli_tx60l = {
     1.108,
     {0.005, 0.008, 0.06},
     20.0,
+    NULL,
 };
 
 #endif

@@ -143,6 +143,7 @@ typedef struct flexcomp_robot {
   double payload_kg;                    /**< default load */
   double payload_com_m[3];              /**< its centre of mass in F6 */
   double reference_temperature_c;       /**< of the nominal lengths */
+  const char* serial;                   /**< UTF-8, zero-terminated, copied; NULL: none */
 } flexcomp_robot;
 
 /** Sets a robot without name and links: limits of two turns, gravity (0, 0, -9.8), tool at the flange, no

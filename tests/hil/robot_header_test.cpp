@@ -43,7 +43,9 @@ bool same_bits(const std::vector<double>& a, const double* b) {
 TEST(RobotHeader, InTheRepositoryIsTheRobotFileToTheLastBit) {
   const Robot file = robot_file("tx60l");
   const std::vector<double> expected = numbers(file.nominal);
-  ASSERT_EQ(sizeof staubli_tx60l, offsetof(flexcomp_robot, links) + expected.size() * sizeof(double));
+  ASSERT_EQ(offsetof(flexcomp_robot, serial),
+            offsetof(flexcomp_robot, links) + expected.size() * sizeof(double));
+  EXPECT_EQ(staubli_tx60l.serial, nullptr);
   EXPECT_TRUE(same_bits(expected, &staubli_tx60l.links[0].theta_rad));
   EXPECT_EQ(file.name, staubli_tx60l.name);
 
