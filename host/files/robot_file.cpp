@@ -139,8 +139,8 @@ namespace {
 
 Robot read_robot(const YamlField& root, LongLinks long_links) {
   const std::string& path = root.file();
-  root.require_keys({"name", "serial", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c",
-                     "noise", "capsules"});
+  root.require_keys({"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise",
+                     "capsules", "serial"});
   Robot robot;
   robot.path = path;
   robot.name = root.at("name").text();

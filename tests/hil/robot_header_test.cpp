@@ -81,6 +81,10 @@ TEST(RobotHeader, NumbersReadBackToTheSameBits) {
 }
 
 TEST(RobotHeader, NamesBecomeIdentifiersAndLiterals) {
+  EXPECT_THAT(robot_header(robot_file("ur5")), testing::HasSubstr("\n    NULL,\n};"));
+  Robot unit = robot_file("ur5");
+  set_serial(unit, "A \"1\"\x01 ä");
+  EXPECT_THAT(robot_header(unit), testing::HasSubstr("\n    \"A \\\"1\\\"\\001 \\303\\244\",\n};"));
   EXPECT_EQ(c_identifier("staubli-tx60l"), "staubli_tx60l");
   EXPECT_EQ(c_identifier("6-axis"), "robot_6_axis");
   EXPECT_EQ(c_identifier("_arm"), "robot__arm");
