@@ -5,6 +5,7 @@
 #include <sys/signalfd.h>
 #include <time.h>
 
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <cmath>
@@ -22,6 +23,7 @@
 #include "files/robot_file.hpp"
 #include "flexcomp_firmware/device.hpp"
 #include "ports.hpp"
+#include "signing/keys.hpp"
 #include "slot_file.hpp"
 
 namespace {
@@ -40,6 +42,8 @@ constexpr std::string_view usage =
     "never\n"
     "  --modbus-rtu DEVICE[:BAUD[:PARITY]][:UNIT] serve Modbus RTU on a serial device\n"
     "  --cycle-us 1000                            period of the control cycle, us\n"
+    "  --trust KEY.pub                            use sets only that are signed with this key; again: each "
+    "counts\n"
     "  --trial-cycles 60000                       control cycles until an unconfirmed trial reverts\n"
     "  --heartbeat-ms 1000                        CANopen heartbeat, ms; 0: none\n"
     "  --help                                     this text\n"
@@ -55,6 +59,7 @@ class UsageError : public std::runtime_error {
 struct Options {
   std::string robot;
   std::string store;
+  std::vector<std::string> keys;  ///< files
   std::optional<host::CanAddress> can;
   std::optional<host::ModbusTcpAddress> tcp;
   std::optional<host::ModbusRtuAddress> rtu;
@@ -108,6 +113,8 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
       o.robot = value;
     } else if (option == "--store") {
       o.store = value;
+    } else if (option == "--trust") {
+      o.keys.push_back(value);
     } else if (option == "--can") {
       o.can = std::get<host::CanAddress>(host::parse_bus_address("can:" + value).at);
     } else if (option == "--modbus-tcp") {
@@ -162,6 +169,23 @@ void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atom
   }
 }
 
+/// Whose sets are used; the keys must outlive it.
+firmware::Trust trust(const std::vector<host::PublicKey>& keys) {
+  firmware::Trust t;
+  static_assert(sizeof(host::PublicKey) == signing::key_bytes);
+  t.keys = reinterpret_cast<const std::uint8_t(*)[signing::key_bytes]>(keys.data());
+  t.count = static_cast<std::uint16_t>(keys.size());
+  t.check = [](void*, const std::uint8_t* key, const std::uint8_t* signature, const std::uint8_t* message,
+               std::uint32_t size) {
+    host::PublicKey k;
+    host::Signature s;
+    std::copy_n(key, k.size(), k.begin());
+    std::copy_n(signature, s.size(), s.begin());
+    return host::verify(k, {message, size}, s) ? 1 : 0;
+  };
+  return t;
+}
+
 int serve(const Options& options) {
   const host::Robot robot = host::load_robot(options.robot);
   hil::SlotFile slots(options.store);
@@ -170,8 +194,16 @@ int serve(const Options& options) {
   settings.control.motion.cycle_us = options.cycle_us;
   settings.store.trial_cycles = options.trial_cycles;
   settings.name = robot.name.c_str();
+  settings.serial = robot.serial.c_str();
+  std::vector<host::PublicKey> keys;
+  for (const std::string& path : options.keys) keys.push_back(host::read_public_key(path));
+  if (!keys.empty() && robot.serial.empty()) {
+    throw host::InputError(options.robot, 0, "serial", "a serial number, as signed sets are for one unit",
+                           "none");
+  }
   const auto device = std::make_unique<firmware::Device>(robot.nominal, slots.hooks(), settings);
-  device->store().boot();
+  device->set_trust(trust(keys));
+  device->boot();
   const std::uint16_t faults = device->store().faults();
   if ((faults & wire::fault::older_slot) != 0) {
     std::fprintf(stderr, "flexcomp-controller: the newest set is damaged, the one before is used\n");
@@ -215,7 +247,7 @@ int serve(const Options& options) {
     ::poll(waiting.data(), waiting.size(), working ? 0 : 5);
     if ((waiting[0].revents & POLLIN) != 0) break;
     for (const auto& port : ports) port->serve();
-    device->store().poll(hil::now_ms());
+    device->poll(hil::now_ms());
   }
   stop = true;
   cycle.join();

@@ -21,6 +21,7 @@
 #include "flexcomp/bytes.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -99,6 +100,7 @@ class CanopenClient final : public ControllerClient {
     ObjectAddress object{co::capability, 0};
     if (record == Record::status) object.index = co::status;
     if (record == Record::robot) object.index = co::robot;
+    if (record == Record::unit) object.index = co::unit;
     return upload(object, size);
   }
 

@@ -7,7 +7,9 @@
 #include <map>
 #include <thread>
 
+#include "flexcomp/image.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -36,6 +38,8 @@ bool may_still_come(wire::Command command, const wire::Status& now) {
   switch (command) {
     case wire::Command::confirm:
       return is(now, wire::StoreState::trial);
+    case wire::Command::restore_defaults:
+      return now.active_slot != wire::no_slot || now.previous_sequence != 0;
     case wire::Command::rollback:
       return now.previous_sequence != 0 || is(now, wire::StoreState::trial);
     default:
@@ -59,7 +63,8 @@ std::string describe(wire::Command command) {
       {wire::Command::confirm, "confirm the set on trial"},
       {wire::Command::rollback, "roll back"},
       {wire::Command::abort, "drop what is staged"},
-      {wire::Command::restore_defaults, "erase both sets"}};
+      {wire::Command::restore_defaults, "erase both sets"},
+      {wire::Command::unlock, "unlock what destroys sets"}};
   const auto known = words.find(command);
   return known == words.end() ? "nothing" : known->second;
 }
@@ -123,7 +128,7 @@ std::optional<Robot> ControllerClient::robot() {
     bytes = read_record(Record::robot, wire::robot_record_bytes);
   } catch (const BusRefusal& refusal) {
     if (refusal.no_such_object) return std::nullopt;
-    throw_refusal("read which robot it is for", refusal);
+    throw_refusal("read which robot it is for", refusal, milliseconds(0));
   }
   Robot out;
   std::array<char, wire::robot_name_bytes> name{};
@@ -138,11 +143,40 @@ std::optional<Robot> ControllerClient::robot() {
         fmt::format("the robot that the controller tells ('{}') does not have the hashes that it tells",
                     out.name));
   }
+  if (const std::optional<ControllerUnit> told = unit()) {
+    out.serial = told->serial;
+    out.nominal.unit_hash = told->hash;
+  }
+  return out;
+}
+
+std::optional<ControllerUnit> ControllerClient::unit() {
+  if ((capability_.flags & wire::capability_flag::unit) == 0) return std::nullopt;
+  Bytes bytes;
+  retry_while_busy("read which unit it is",
+                   [&] { bytes = read_record(Record::unit, wire::unit_record_bytes); });
+  wire::UnitRecord record;
+  wire::decode(bytes.data(), byte_order(), record);
+  ControllerUnit out;
+  out.hash = record.unit_hash;
+  out.counter = record.counter;
+  out.keys = record.keys;
+  out.key_ids.assign(record.key_ids.begin(),
+                     record.key_ids.begin() + std::min<std::ptrdiff_t>(record.keys, wire::listed_keys));
+  if (record.serial_size == 0) return out;
+  out.serial.assign(record.serial.begin(), record.serial.begin() + record.serial_size);
+  if (!is_serial(out.serial) || name_hash(out.serial.data(), out.serial.size()) != out.hash) {
+    // Not repeated: it may be what makes a terminal do something.
+    throw BusError(where_,
+                   "the serial number that the controller tells does not have the hash that it tells");
+  }
   return out;
 }
 
 void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress& progress) {
-  retry_while_busy("take in a set", [&] { send_image(image, progress); });
+  retry_while_busy(
+      "take in a set", [&] { send_image(image, progress); },
+      std::max(options_.staging_timeout, options_.response_timeout));
 }
 
 void ControllerClient::run(wire::Command command, std::uint32_t argument) {
@@ -343,20 +377,23 @@ wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
 
 /// Repeats a request until the controller is no longer busy with another client's transfer or a switch of sets.
 template <class Action>
-void ControllerClient::retry_while_busy(const std::string& request, const Action& action) {
-  const auto end = steady_clock::now() + options_.response_timeout;
+void ControllerClient::retry_while_busy(const std::string& request, const Action& action,
+                                        std::optional<milliseconds> longest) {
+  const milliseconds limit = longest.value_or(options_.response_timeout);
+  const auto end = steady_clock::now() + limit;
   for (;;) {
     try {
       action();
       return;
     } catch (const BusRefusal& refusal) {
-      if (!refusal.busy || steady_clock::now() > end) throw_refusal(request, refusal);
+      if (!refusal.busy || steady_clock::now() > end) throw_refusal(request, refusal, limit);
     }
     std::this_thread::sleep_for(2 * polling_interval);
   }
 }
 
-void ControllerClient::throw_refusal(const std::string& request, const BusRefusal& from_bus) {
+void ControllerClient::throw_refusal(const std::string& request, const BusRefusal& from_bus,
+                                     milliseconds waited) {
   // A bus has one code for many reasons; the status record has the reason.
   wire::Status now;
   try {
@@ -374,7 +411,7 @@ void ControllerClient::throw_refusal(const std::string& request, const BusRefusa
     throw RefusedByController(
         where_,
         fmt::format("asked to {}, the controller was busy for {:.1f} s ({}): another client is at work",
-                    request, in_seconds(options_.response_timeout), from_bus.code),
+                    request, in_seconds(waited), from_bus.code),
         wire::Answer::busy, Refusal::none);
   }
   throw RefusedByController(

@@ -3,6 +3,7 @@
 /// Client of a controller, the same protocol on Modbus and CANopen (flexcomp/wire/store_state.hpp).
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -35,6 +36,9 @@ struct ClientOptions {
   std::chrono::milliseconds response_timeout{3000};
   /// Time limit for erasing and writing non-volatile memory.
   std::chrono::milliseconds write_timeout{20000};
+  /// How long the staging area may belong to another client. Longer than the 3 s of silence after which a controller gives it
+  /// to the next one (store_state.hpp).
+  std::chrono::milliseconds staging_timeout{10000};
 };
 
 /// The controller refused a request.
@@ -72,6 +76,15 @@ class OutcomeOpen : public DoubtfulResult {
   std::string text_;
 };
 
+/// Which unit a controller belongs to, and whom it trusts (flexcomp/wire/unit_record.hpp).
+struct ControllerUnit {
+  Sha256Digest hash{};        ///< of the serial number; zeros: it has none
+  std::string serial;         ///< empty where there is none, or only its hash is told
+  std::uint64_t counter = 0;  ///< highest one of a signature that was accepted, 0: none
+  std::size_t keys = 0;       ///< that are trusted
+  std::vector<std::array<std::uint8_t, 8>> key_ids;  ///< of the first of them
+};
+
 /// Connection to one controller. Every member throws BusError, whose message names the address and the request.
 class ControllerClient {
  public:
@@ -86,13 +99,16 @@ class ControllerClient {
   wire::Status status();
 
   /// Reads the nominal robot of the controller and verifies it against the capability's hashes; nothing where the
-  /// controller has no robot record. The name is empty where it has only the hash.
+  /// controller has no robot record. The name is empty where it has only the hash. The serial number is that of unit().
   std::optional<Robot> robot();
+
+  /// Reads the unit record, whose serial number is verified against its hash; nothing where the controller has none.
+  std::optional<ControllerUnit> unit();
 
   /// Transfers an image into the staging area. The active set does not change.
   void stage(std::span<const std::uint8_t> image, const Progress& progress = {});
 
-  /// Executes a store command that changes no active set (begin, verify, abort), and waits for its end. A busy controller
+  /// Executes a store command that changes no active set (begin, verify, abort, unlock), and waits for its end. A busy controller
   /// is asked again until response_timeout. \throws RefusedByController with the controller's reason
   void run(wire::Command command, std::uint32_t argument = 0);
 
@@ -117,7 +133,7 @@ class ControllerClient {
 
  protected:
   /// Records that are read as bytes, in the byte order of the bus.
-  enum class Record { capability, status, robot };
+  enum class Record { capability, status, robot, unit };
 
   /// Refusal as the bus reports it: Modbus exception or SDO abort.
   struct BusRefusal {
@@ -150,8 +166,10 @@ class ControllerClient {
   std::optional<wire::Status> status_or_wait(Patience& patience, const std::string& question);
 
   template <class Action>
-  void retry_while_busy(const std::string& request, const Action& action);
-  [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& from_bus);
+  void retry_while_busy(const std::string& request, const Action& action,
+                        std::optional<std::chrono::milliseconds> longest = std::nullopt);
+  [[noreturn]] void throw_refusal(const std::string& request, const BusRefusal& from_bus,
+                                  std::chrono::milliseconds waited);
 
   ClientOptions options_;
   std::string where_;

@@ -13,6 +13,7 @@
 #include "bus/controller_client.hpp"
 #include "flexcomp/wire/modbus_map.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 
 namespace flexcomp::host {
 namespace {
@@ -64,6 +65,7 @@ class ModbusClient final : public ControllerClient {
     std::uint16_t from = map::capability;
     if (record == Record::status) from = map::status;
     if (record == Record::robot) from = map::robot;
+    if (record == Record::unit) from = map::unit;
     Bytes out;
     std::array<std::uint16_t, map::most_read> registers{};
     for (std::size_t left = size / 2; left != 0;) {

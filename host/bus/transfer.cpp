@@ -55,6 +55,11 @@ std::vector<std::string> beyond_capability(const wire::Capability& capability,
   if (capability.schema >> 8U != header.schema_major) {
     out.push_back(fmt::format("the image has schema {}.{}, the controller knows {}.x", header.schema_major,
                               header.schema_minor, capability.schema >> 8U));
+  } else if (header.schema_minor > (capability.schema & 0xFFU)) {
+    out.push_back(fmt::format(
+        "the image has schema {}.{}, the controller knows {}.{}: it can check neither unit nor "
+        "signature",
+        header.schema_major, header.schema_minor, capability.schema >> 8U, capability.schema & 0xFFU));
   }
   for (const unsigned basis : required.bases) {
     if (basis >= 32 || (capability.bases >> basis & 1U) == 0) {
@@ -89,6 +94,22 @@ void refuse_beyond_capability(const ControllerClient& client, const std::string&
   if (beyond.empty()) return;
   throw BusError(client.where(), fmt::format("{} is more than this controller can do: {}; nothing was sent",
                                              source, fmt::join(beyond, "; ")));
+}
+
+void refuse_other_unit(const ControllerClient& client, const std::optional<ControllerUnit>& there,
+                       const std::string& source, const Sha256Digest& unit_hash, const std::string& serial) {
+  if (!is_given(unit_hash)) return;
+  const std::string wanted = unit_text(serial, unit_hash);
+  if (!there) {
+    throw BusError(
+        client.where(),
+        fmt::format("{} is bound to {}, and this firmware cannot check which unit it belongs to: update it, "
+                    "or take the serial number out of the robot file; nothing was sent",
+                    source, wanted));
+  }
+  if (there->hash == unit_hash) return;
+  throw BusError(client.where(), fmt::format("{} is for {}, the controller belongs to {}; nothing was sent",
+                                             source, wanted, unit_text(there->serial, there->hash)));
 }
 
 SetIdentity identity(std::span<const std::uint8_t> image) {
@@ -132,10 +153,9 @@ std::optional<wire::Status> read_back(ControllerClient& client, std::span<const 
                                 wanted.sequence, trouble));
 }
 
-wire::Status push_image(ControllerClient& client, std::span<const std::uint8_t> image,
-                        const PushOptions& options) {
+void stage_verified(ControllerClient& client, std::span<const std::uint8_t> bytes, const Progress& progress) {
   try {
-    client.stage(image, options.progress);
+    client.stage(bytes, progress);
     client.run(wire::Command::verify);
   } catch (const RefusedByController& e) {
     // In a busy controller the staging area belongs to another client.
@@ -148,6 +168,11 @@ wire::Status push_image(ControllerClient& client, std::span<const std::uint8_t> 
     }
     throw;
   }
+}
+
+wire::Status push_image(ControllerClient& client, std::span<const std::uint8_t> image,
+                        const PushOptions& options) {
+  stage_verified(client, image, options.progress);
   const SetIdentity wanted = identity(image);
   client.conclude(options.trial_cycles ? wire::Command::commit_trial : wire::Command::commit,
                   options.trial_cycles.value_or(0),
@@ -181,6 +206,31 @@ wire::Status roll_back(ControllerClient& client) {
   });
 }
 
+wire::Status erase(ControllerClient& client) {
+  const auto is_empty = [](const wire::Status& now) {
+    return now.active_slot == wire::no_slot && now.previous_sequence == 0;
+  };
+  // Where there was nothing before, the answer alone tells whether it was done.
+  const bool was_empty = is_empty(client.status());
+  return client.conclude(wire::Command::restore_defaults, 0, [&](const wire::Status& now) {
+    return is_empty(now) && (!was_empty || now.answer == static_cast<std::uint16_t>(wire::Answer::accepted));
+  });
+}
+
+void unlock(ControllerClient& client) {
+  // The number is told in a status that is every client's: another one's command may have changed it meanwhile.
+  for (int attempt = 0;; ++attempt) {
+    client.run(wire::Command::unlock);
+    const std::uint32_t number = client.status().detail;
+    try {
+      client.run(wire::Command::unlock, number);
+      return;
+    } catch (const RefusedByController& e) {
+      if (attempt == 2 || e.answer() != wire::Answer::not_authorised) throw;
+    }
+  }
+}
+
 Robot robot_of(ControllerClient& client, const std::string& robot_path) {
   if (robot_path.empty()) {
     std::optional<Robot> told = client.robot();
@@ -200,6 +250,13 @@ Robot robot_of(ControllerClient& client, const std::string& robot_path) {
     throw BusError(client.where(), fmt::format("the controller's nominal geometry is {}, that of {} is {}",
                                                short_hex(there.nominal_hash), robot.path,
                                                short_hex(nominal_hash(robot.nominal))));
+  }
+  if (is_given(robot.nominal.unit_hash)) {
+    const std::optional<ControllerUnit> unit = client.unit();
+    if (unit && is_given(unit->hash) && unit->hash != robot.nominal.unit_hash)
+      throw BusError(client.where(), fmt::format("{} is {}, the controller belongs to {}", robot.path,
+                                                 unit_text(robot.serial, robot.nominal.unit_hash),
+                                                 unit_text(unit->serial, unit->hash)));
   }
   return robot;
 }

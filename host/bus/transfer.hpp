@@ -21,6 +21,11 @@ namespace flexcomp::host {
 void refuse_beyond_capability(const ControllerClient& client, const std::string& source,
                               std::span<const std::uint8_t> image);
 
+/// Verifies that a controller is the unit that an image is bound to, and can verify it itself. \param there  its unit()
+/// \param serial  of the image's unit, for messages; empty where it is not known \throws BusError
+void refuse_other_unit(const ControllerClient& client, const std::optional<ControllerUnit>& there,
+                       const std::string& source, const Sha256Digest& unit_hash, const std::string& serial);
+
 /// Next sequence number: one above the newest set of the controller; 1 after 2^32 - 1. \throws BusError
 std::uint32_t next_sequence(ControllerClient& client);
 
@@ -58,6 +63,16 @@ wire::Status confirm_trial(ControllerClient& client);
 
 /// Returns to the set before; returns the status then. Throws as push_image().
 wire::Status roll_back(ControllerClient& client);
+
+/// Erases both sets; returns the status in which none is active. Throws as push_image().
+wire::Status erase(ControllerClient& client);
+
+/// Stages an image or a signed command and lets the controller verify it; on a refusal nothing stays staged. \throws BusError
+void stage_verified(ControllerClient& client, std::span<const std::uint8_t> bytes,
+                    const Progress& progress = {});
+
+/// Lets the next rollback or erase of this connection pass where no key is trusted. \throws BusError
+void unlock(ControllerClient& client);
 
 /// Nominal robot of a controller: from `robot_path`, verified by the controller's hashes, or from its robot record.
 /// \throws BusError  another robot or geometry; no path given and no robot record

@@ -76,11 +76,14 @@ int run(int argc, char** argv) {
   add_pull(app);
   add_status(app);
   add_rollback(app);
+  add_erase(app);
   add_probe(app);
   add_report(app);
   add_export(app);
   add_study(app);
   add_import(app);
+  add_keygen(app);
+  add_trust(app);
   add_completion(app);
   // The help text would end in the middle of a line.
   for (CLI::App* command : app.get_subcommands({})) command->footer(command->get_footer() + "\n");

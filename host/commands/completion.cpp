@@ -44,10 +44,11 @@ std::vector<std::string> choices_of(CLI::Option& option) {
 std::string files_of(const CLI::Option& option) {
   std::set<std::string> endings;
   const std::string type = option.get_type_name();
-  for (const char* ending : {"yaml", "csv", "html", "urdf"}) {
+  for (const char* ending : {"yaml", "csv", "html", "urdf", "pub"}) {
     if (type.find(fmt::format(".{}", ending)) != std::string::npos) endings.insert(ending);
   }
-  if (endings.empty()) return type.find("FILE") != std::string::npos ? "_flexcomp_files '*'" : "";
+  if (endings.empty())
+    return type.find("FILE") != std::string::npos || type == "KEY" ? "_flexcomp_files '*'" : "";
   if (endings.size() > 1) return fmt::format("_flexcomp_files '*.@({})'", fmt::join(endings, "|"));
   return fmt::format("_flexcomp_files '*.{}'", *endings.begin());
 }

@@ -39,13 +39,14 @@ void Push::show_changes() const {
   TermSet now;
   TermSet next;
   if (against.empty()) {
-    const std::optional<Bytes> ready = read_image_file(set);
+    const auto [ready, signer] = read_files();
     const std::unique_ptr<ControllerClient> client = bus.connect();
     for_robot = robot_of(*client, robot);
-    const Bytes bytes = ready ? *ready : make(*client, left_out, sequence);
+    const MadeSet made = make(*client, ready, sequence);
+    left_out = made.left_out;
     // A file that is no image is the file's fault; what a sound one asks for may be beyond the controller.
-    next = calibration_from_image(bytes, for_robot, set).terms;
-    refuse_beyond_capability(*client, set, bytes);
+    next = calibration_from_image(made.bytes, for_robot, set).terms;
+    const Bytes bytes = authorised(*client, made, signer ? &*signer : nullptr, result);
     const wire::Status status = client->status();
     Bytes active;
     if (status.active_slot != wire::no_slot) {
@@ -55,6 +56,7 @@ void Push::show_changes() const {
     if (!active.empty()) now = calibration_held(*client, active, for_robot).terms;
     const std::string before =
         active.empty() ? "no set, commands pass through" : fmt::format("set {}", status.active_sequence);
+    say_signed(result);
     bus.say(fmt::format("{}: holds {}; {} would be sent ({} bytes). Nothing was sent.", client->where(),
                         before, set, bytes.size()));
     result["bus"] = client->where();

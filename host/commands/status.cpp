@@ -9,6 +9,7 @@
 
 #include "commands/bus_options.hpp"
 #include "commands/commands.hpp"
+#include "commands/key_options.hpp"
 #include "flexcomp/bytes.hpp"
 #include "json.hpp"
 #include "model/calibration.hpp"
@@ -37,6 +38,7 @@ void show_status(const BusOptions& bus) {
   const wire::Capability& can = client->capability();
   const wire::Status now = client->status();
   const std::optional<Robot> robot = client->robot();
+  const std::optional<ControllerUnit> unit = client->unit();
 
   const auto state = wire::name(static_cast<wire::StoreState>(now.state));
   const auto answer =
@@ -63,6 +65,12 @@ void show_status(const BusOptions& bus) {
   std::string text = fmt::format("{}: {}, flexcomp {}, {} arithmetic", client->where(),
                                  robot && !robot->name.empty() ? robot->name : "a robot without a name",
                                  version(can.firmware), can.scalar_bytes == 4 ? "single" : "double");
+  if (unit) {
+    text += fmt::format("\n  unit       {}", unit_text(unit->serial, unit->hash));
+    text += fmt::format("\n  trusts     {}", unit->keys == 0 ? "no key: takes sets from everybody"
+                                                             : fmt::format("{}; highest counter {}",
+                                                                           keys_text(*unit), unit->counter));
+  }
   text += now.active_slot == wire::no_slot
               ? "\n  active     no set: commands pass through"
               : fmt::format("\n  active     set {}, {} bytes, CRC {:08x}{}", now.active_sequence,
@@ -96,6 +104,7 @@ void show_status(const BusOptions& bus) {
         {"bytes", now.active_bytes},
         {"crc", fmt::format("{:08x}", now.active_crc)},
         {"settled", now.settled != 0}}},
+      {"unit", unit_json(unit)},
       {"previous_sequence", now.previous_sequence},
       {"announced_bytes", now.announced_bytes},
       {"staged_bytes", now.staged_bytes},

@@ -11,6 +11,7 @@
 #include "files/read_file.hpp"
 #include "files/text.hpp"
 #include "input_error.hpp"
+#include "utf8.hpp"
 
 namespace flexcomp::host {
 
@@ -36,14 +37,10 @@ std::optional<std::string_view> without_comment_mark(std::string_view line) {
 }
 
 bool is_utf8(std::string_view text) {
-  for (std::size_t k = 0; k < text.size();) {
-    const auto c = static_cast<unsigned char>(text[k++]);
-    // Two bytes from 0xC2, three from 0xE0, four up to 0xF4.
-    std::size_t more = c < 0x80 ? 0 : c >= 0xC2 && c < 0xE0 ? 1 : c >= 0xE0 && c < 0xF0 ? 2 : 3;
-    if (more == 3 && (c < 0xF0 || c > 0xF4)) return false;
-    for (; more > 0; --more, ++k) {
-      if (k >= text.size() || (static_cast<unsigned char>(text[k]) & 0xC0U) != 0x80U) return false;
-    }
+  while (!text.empty()) {
+    const std::size_t bytes = utf8_length(text);
+    if (bytes == 0) return false;
+    text.remove_prefix(bytes);
   }
   return true;
 }

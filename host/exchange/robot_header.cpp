@@ -101,6 +101,8 @@ std::string robot_header(const Robot& robot, const std::string& made_by) {
       fmt::format("    {},\n    {},\n    {},\n    {},\n    {},\n    {},\n    {},\n    {},\n", numbers(low),
                   numbers(high), numbers(r.gravity_m_s2), numbers(r.tool_xyz_m), numbers(r.tool_wxyz),
                   number(r.payload_kg), numbers(r.payload_com_m), number(r.reference_temperature_c));
+  // Also where there is none: compilers warn of a member that is left out.
+  text += fmt::format("    {},\n", robot.serial.empty() ? "NULL" : c_string(robot.serial));
   text += "};\n\n#endif\n";
   return text;
 }

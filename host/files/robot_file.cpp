@@ -102,7 +102,9 @@ std::string robot_text(const Robot& robot, const std::vector<std::string>& comme
         line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
     text += line.empty() ? "#\n" : "# " + line + "\n";
   }
-  text += "name: " + yaml_quoted(robot.name) + "\njoints:\n";
+  text += "name: " + yaml_quoted(robot.name) + "\n";
+  if (!robot.serial.empty()) text += "serial: " + yaml_quoted(robot.serial) + "\n";
+  text += "joints:\n";
   for (std::size_t i = 0; i < joint_count; ++i) text += joint_text(robot, i);
   text += "gravity_m_s2: " + list_text(vector3(nominal.gravity_m_s2), unit::si) + "\n";
   const auto& q = nominal.tool_wxyz;
@@ -137,12 +139,23 @@ namespace {
 
 Robot read_robot(const YamlField& root, LongLinks long_links) {
   const std::string& path = root.file();
-  root.require_keys(
-      {"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise", "capsules"});
+  root.require_keys({"name", "joints", "gravity_m_s2", "tool", "payload", "reference_temperature_c", "noise",
+                     "capsules", "serial"});
   Robot robot;
   robot.path = path;
   robot.name = root.at("name").text();
   robot.nominal.name_hash = name_hash(robot.name.data(), robot.name.size());
+
+  if (const auto serial = root.find("serial")) {
+    const std::string text = serial->text();
+    if (!is_serial(text)) {
+      // What was found is not repeated: it may be what makes a terminal do something.
+      throw serial->error(
+          fmt::format("a serial number of 1 to {} bytes of UTF-8 without control characters", longest_serial),
+          fmt::format("{} bytes that are none", text.size()));
+    }
+    set_serial(robot, text);
+  }
 
   const YamlField list = root.at("joints");
   const std::vector<YamlField> joints = list.items();

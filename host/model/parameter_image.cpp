@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "flexcomp/image.hpp"
+#include "flexcomp/signature.hpp"
 #include "input_error.hpp"
 #include "model/admission.hpp"
 #include "model/effects.hpp"
@@ -31,7 +33,43 @@ struct Collector {
   }
 };
 
+/// The header's word that these bytes are a whole image.
+void require_image(std::span<const std::uint8_t> image, const std::string& source) {
+  ImageHeader header;
+  const Refusal refusal = read_header(image.data(), image.size(), header);
+  if (refusal != Refusal::none)
+    throw InputError(source, 0, "", "a parameter image", fmt::format("that {}", text(refusal)));
+}
+
 }  // namespace
+
+ImageRecords image_records(std::span<const std::uint8_t> image, const std::string& source) {
+  require_image(image, source);
+  ImageRecords out;
+  if (const std::uint8_t* unit = bound_unit(image.data(), image.size()))
+    std::copy_n(unit, out.unit_hash.size(), out.unit_hash.begin());
+  if (const std::uint8_t* record = signature_of(image.data(), image.size())) {
+    out.is_signed = true;
+    out.counter = load_u64(record + signing::record_counter);
+    std::copy_n(record + signing::record_key_id, out.key_id.size(), out.key_id.begin());
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> without_signature(std::span<const std::uint8_t> image, const std::string& source) {
+  // Bytes 92 … 95 of the header (image.hpp): number of joints, from schema 1.1.
+  constexpr std::size_t joints_at = 92;
+  require_image(image, source);
+  std::vector<std::uint8_t> out(image.begin(), image.end());
+  if (signature_of(out.data(), out.size()) == nullptr) return out;
+  out.resize(out.size() - image::record_head_bytes - image::signature_bytes);
+  // An image in which nothing of schema 1.1 is left is one of 1.0 (encode_image()).
+  if (bound_unit(out.data(), out.size()) == nullptr && out[joints_at] == 0) out[5] = 0;
+  store_u32(out.data() + 8, static_cast<std::uint32_t>(out.size()));
+  const std::size_t crc_at = out.size() - image::crc_bytes;
+  store_u32(out.data() + crc_at, crc32(out.data(), crc_at));
+  return out;
+}
 
 std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot& robot,
                                      std::uint32_t sequence, const ImageOptions& options) {
@@ -64,7 +102,8 @@ std::vector<std::uint8_t> make_image(const Calibration& calibration, const Robot
   header.sequence = sequence;
   header.nominal_hash = nominal_hash(robot.nominal);
   header.name_hash = robot.nominal.name_hash;
-  std::vector<std::uint8_t> bytes(image_size(pushed.list()));
+  header.unit_hash = robot.nominal.unit_hash;
+  std::vector<std::uint8_t> bytes(image_size(pushed.list(), is_given(header.unit_hash)));
   bytes.resize(encode_image(pushed.list(), header, bytes.data(), bytes.size()));
   return bytes;
 }
@@ -90,6 +129,11 @@ Calibration calibration_from_image(std::span<const std::uint8_t> bytes, const Ro
   if (refusal == Refusal::none)
     refusal = visit_image<double>(bytes.data(), bytes.size(), Collector{calibration.terms});
   if (refusal != Refusal::none) throw refuse(fmt::format("that {}", text(refusal)));
+  const Sha256Digest unit = image_records(bytes, source).unit_hash;
+  if (is_given(unit) && is_given(robot.nominal.unit_hash) && unit != robot.nominal.unit_hash) {
+    throw refuse(fmt::format("one for {}, not for {}", unit_text("", unit),
+                             unit_text(robot.serial, robot.nominal.unit_hash)));
+  }
   // Before names are looked for, which reads the tables as far as they say that they go.
   prepare(calibration.terms, robot, source);
   try {

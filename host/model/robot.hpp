@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "flexcomp/robot.hpp"
@@ -26,7 +27,8 @@ struct Capsule {
 struct Robot {
   std::string path;  ///< as it was given, for messages
   std::string name;
-  NominalRobot<joint_count> nominal;          ///< with name_hash of `name`
+  std::string serial;                         ///< of the unit; empty where it is not known
+  NominalRobot<joint_count> nominal;          ///< with name_hash of `name` and unit_hash of `serial`
   std::vector<Eigen::Vector3d> reflectors_m;  ///< A, B, C(, D) in Ftool; empty where the file has none
   bool has_noise = false;              ///< false: the two figures below are this program's, not the file's
   double position_sigma_m = 0.035e-3;  ///< standard deviation per axis of a measured point
@@ -35,5 +37,17 @@ struct Robot {
   std::array<double, joint_count> gear_ratio{};  ///< motor turns per joint turn, 0 where unknown
   std::vector<Capsule> capsules;
 };
+
+/// Longest serial number of a unit, bytes of UTF-8: what a controller can tell (flexcomp/wire/unit_record.hpp).
+constexpr std::size_t longest_serial = 44;
+
+/// Whether a text may be a serial number: 1 … longest_serial bytes of UTF-8 without control characters.
+bool is_serial(std::string_view text);
+
+/// Names the unit that a robot is; its sets are then bound to it.
+void set_serial(Robot& robot, const std::string& serial);
+
+/// The unit for messages: `unit 'A-4711'`; by its hash where only that is known.
+std::string unit_text(const std::string& serial, const Sha256Digest& unit_hash);
 
 }  // namespace flexcomp::host

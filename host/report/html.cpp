@@ -7,6 +7,8 @@
 #include <array>
 #include <utility>
 
+#include "utf8.hpp"
+
 namespace flexcomp::host {
 namespace {
 
@@ -25,20 +27,6 @@ std::string class_attribute(const std::string& name) {
 }
 
 }  // namespace
-
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
-  const unsigned first = byte(0), second = byte(1);
-  const auto follows = [&](std::size_t k) { return (byte(k) & 0xC0U) == 0x80U; };
-  if (first < 0x80) return text.empty() ? 0 : 1;
-  if (first < 0xC2 || first > 0xF4 || !follows(1)) return 0;
-  if (first < 0xE0) return 2;
-  // Not a shorter character in more bytes, no half of a pair of UTF-16, nothing beyond U+10FFFF.
-  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) || !follows(2)) return 0;
-  if (first < 0xF0) return 3;
-  if ((first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F) || !follows(3)) return 0;
-  return 4;
-}
 
 std::string escaped(std::string_view text) {
   std::string out;

@@ -10,9 +10,6 @@
 
 namespace flexcomp::host {
 
-/// \return bytes of the UTF-8 character at the start of a text, 0 where there is none (Unicode 15, table 3-7)
-std::size_t utf8_length(std::string_view text);
-
 /// Text from files and users made safe for element content and attributes.
 std::string escaped(std::string_view text);
 

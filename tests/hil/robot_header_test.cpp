@@ -43,7 +43,9 @@ bool same_bits(const std::vector<double>& a, const double* b) {
 TEST(RobotHeader, InTheRepositoryIsTheRobotFileToTheLastBit) {
   const Robot file = robot_file("tx60l");
   const std::vector<double> expected = numbers(file.nominal);
-  ASSERT_EQ(sizeof staubli_tx60l, offsetof(flexcomp_robot, links) + expected.size() * sizeof(double));
+  ASSERT_EQ(offsetof(flexcomp_robot, serial),
+            offsetof(flexcomp_robot, links) + expected.size() * sizeof(double));
+  EXPECT_EQ(staubli_tx60l.serial, nullptr);
   EXPECT_TRUE(same_bits(expected, &staubli_tx60l.links[0].theta_rad));
   EXPECT_EQ(file.name, staubli_tx60l.name);
 
@@ -79,6 +81,10 @@ TEST(RobotHeader, NumbersReadBackToTheSameBits) {
 }
 
 TEST(RobotHeader, NamesBecomeIdentifiersAndLiterals) {
+  EXPECT_THAT(robot_header(robot_file("ur5")), testing::HasSubstr("\n    NULL,\n};"));
+  Robot unit = robot_file("ur5");
+  set_serial(unit, "A \"1\"\x01 ä");
+  EXPECT_THAT(robot_header(unit), testing::HasSubstr("\n    \"A \\\"1\\\"\\001 \\303\\244\",\n};"));
   EXPECT_EQ(c_identifier("staubli-tx60l"), "staubli_tx60l");
   EXPECT_EQ(c_identifier("6-axis"), "robot_6_axis");
   EXPECT_EQ(c_identifier("_arm"), "robot__arm");

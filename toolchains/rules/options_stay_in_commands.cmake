@@ -5,7 +5,7 @@
 cmake_minimum_required(VERSION 3.25)
 
 string(CONCAT command "flexcomp (simulate|plan|identify|validate|diagnose|predict|compensate|push|pull|status|rollback|"
-  "probe|report|export|study|import|completion)")
+  "probe|report|export|study|import|completion|keygen|trust|erase)")
 set(found 0)
 set(files_seen 0)
 file(GLOB_RECURSE files RELATIVE "${ROOT}" "${ROOT}/host/*.hpp" "${ROOT}/host/*.cpp")

@@ -19,7 +19,7 @@ set(hil_may ${parts})
 set(tests_may ${parts})
 # The modules of host besides its own files without a module (units, errors, quaternions), which all of them may include and
 # which include no module. A file may stand beside the modules, for itself alone.
-set(modules model linalg measurement kinematics files identification planning diagnosis bus exchange report studies commands)
+set(modules model linalg measurement kinematics files identification planning diagnosis signing bus exchange report studies commands)
 set(model_may)
 set(linalg_may)
 set(measurement_may model linalg kinematics)
@@ -29,6 +29,7 @@ set(identification_may model measurement linalg)
 set(planning_may model measurement linalg identification files)
 # data_file.hpp for the names of columns in a message.
 set(diagnosis_may model measurement linalg identification host/files/data_file.hpp)
+set(signing_may model files)
 set(bus_may model files)
 set(exchange_may model measurement linalg kinematics files)
 set(report_may model measurement linalg files identification planning diagnosis)

@@ -18,6 +18,7 @@
 #include "bus/sdo_client.hpp"
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 #include "host/bus/bus_fake_controller.hpp"
 #include "support/thrown.hpp"
 
@@ -413,6 +414,7 @@ struct CanopenDevice : fake::Controller {
     server.read = [this](ObjectAddress o, Bytes& out) -> std::uint32_t {
       if (o.index == co::capability) return out = capability_record(little), 0;
       if (o.index == co::status) return out = status_record(little), 0;
+      if (o.index == co::unit && has_unit()) return out = unit_record(little), 0;
       if (o.index == co::robot && tells_robot) return out = robot_record(little), 0;
       if (o.index == co::image && o.sub == co::image_active) return out = active, 0;
       if (o.index == co::probe && o.sub == co::probe_response) return out = answer_bytes, 0;
@@ -658,6 +660,18 @@ TEST(CanopenClient, TellsTheRobotOrAsksForIt) {
   EXPECT_THROW(robot_of(*client, ""), BusError);
   device.tells_robot = false;
   EXPECT_EQ(thrown<BusError>([&] { robot_of(*client, ""); }).code(), ErrorCode::unknown_robot);
+}
+
+TEST(CanopenClient, TellsItsUnitAndUnlocks) {
+  CanopenDevice device;
+  device.belongs_to("B-7");
+  device.previous = numbered_image(40, 1);
+  device.activate(numbered_image(50, 2));
+  Bus bus(std::ref(device.server));
+  const auto client = client_on(bus);
+  EXPECT_EQ(client->unit()->serial, "B-7");
+  unlock(*client);
+  EXPECT_EQ(roll_back(*client).active_sequence, 1U);
 }
 
 }  // namespace

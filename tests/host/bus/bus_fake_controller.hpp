@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bus/controller_client.hpp"
@@ -18,6 +19,9 @@
 #include "flexcomp/robot.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
+#include "flexcomp/wire/unit_record.hpp"
+#include "model/parameter_image.hpp"
+#include "signing/signed_bytes.hpp"
 
 namespace flexcomp::fake {
 
@@ -31,6 +35,16 @@ struct Controller {
   bool tells_robot = true;
   Bytes staged;
   Bytes active;
+  Bytes previous;
+
+  // Who may: only where has_unit().
+  wire::UnitRecord unit;
+  std::vector<host::PublicKey> trusted;
+  std::uint32_t unlock_number = 0;
+  bool unlocked = false;
+  wire::Command permitted = wire::Command::none;  ///< by a signed command
+  int numbers_overtaken = 0;                      ///< so many unlock numbers are gone before they are read
+  std::vector<wire::Command> commands;            ///< that were given
 
   // What goes wrong.
   Refusal verify_refuses = Refusal::none;
@@ -57,6 +71,66 @@ struct Controller {
     capability.name_hash = name_hash(name.data(), name.size());
   }
 
+  /// The unit record is told from here on, and what it says is kept.
+  void belongs_to(const std::string& serial, const std::vector<host::PublicKey>& keys = {}) {
+    capability.flags = wire::capability_flag::unit;
+    capability.schema = 0x0101;
+    unit = {};
+    unit.unit_hash = name_hash(serial.data(), serial.size());
+    unit.serial_size = static_cast<std::uint16_t>(serial.size());
+    std::copy(serial.begin(), serial.end(), unit.serial.begin());
+    trusted = keys;
+    unit.keys = static_cast<std::uint16_t>(keys.size());
+    for (std::size_t k = 0; k < std::min<std::size_t>(keys.size(), 4); ++k)
+      unit.key_ids[k] = host::id_of(keys[k]);
+  }
+  bool has_unit() const { return (capability.flags & wire::capability_flag::unit) != 0; }
+
+  /// Whether what is staged is for this unit and from whom it trusts.
+  Refusal check() {
+    if (!has_unit()) return Refusal::none;
+    SignedCommand command;
+    host::ImageRecords set;
+    const bool is_command = looks_like_command(staged.data(), staged.size());
+    if (is_command) {
+      const Refusal r = decode(staged.data(), staged.size(), command);
+      if (r != Refusal::none) return r;
+      set = {command.unit_hash, true, command.counter, command.key_id};
+    } else {
+      set = host::image_records(staged, "staged");
+    }
+    if (is_given(set.unit_hash) && set.unit_hash != unit.unit_hash) return Refusal::wrong_unit;
+    if (trusted.empty()) return Refusal::none;
+    if (!set.is_signed || !is_given(set.unit_hash)) return Refusal::not_signed;
+    const auto key = std::find_if(trusted.begin(), trusted.end(),
+                                  [&](const host::PublicKey& k) { return host::id_of(k) == set.key_id; });
+    if (key == trusted.end()) return Refusal::unknown_key;
+    if (!(is_command ? host::is_command_signed_by(staged, *key) : host::is_signed_by(staged, *key)))
+      return Refusal::wrong_signature;
+    if (set.counter <= unit.counter) return Refusal::counter_used;
+    unit.counter = set.counter;
+    if (is_command && command.active_crc == status.active_crc)
+      permitted = static_cast<wire::Command>(command.command);
+    return Refusal::none;
+  }
+
+  bool may_destroy(wire::Command command) {
+    const bool out = !has_unit() || (trusted.empty() ? unlocked : permitted == command);
+    unlocked = false;
+    permitted = wire::Command::none;
+    return out;
+  }
+
+  void activate(const Bytes& image) {
+    active = image;
+    status.active_slot = image.empty() ? wire::no_slot : std::uint16_t{0};
+    status.active_bytes = static_cast<std::uint32_t>(active.size());
+    status.active_sequence = image.empty() ? 0 : load_u32(active.data() + 12);
+    status.active_crc = image.empty() ? 0 : load_u32(active.data() + active.size() - 4);
+    status.previous_sequence = previous.empty() ? 0 : load_u32(previous.data() + 12);
+    status.state = static_cast<std::uint16_t>(wire::StoreState::idle);
+  }
+
   wire::Answer answer(wire::Answer a, Refusal r = Refusal::none, std::uint32_t detail = 0) {
     status.answer = static_cast<std::uint16_t>(a);
     status.refusal = static_cast<std::uint16_t>(r);
@@ -70,6 +144,7 @@ struct Controller {
       --busy;
       return answer(Answer::busy);
     }
+    commands.push_back(command);
     switch (command) {
       case wire::Command::begin:
         staged.assign(argument, 0);
@@ -77,6 +152,7 @@ struct Controller {
         return answer(Answer::accepted);
       case wire::Command::verify:
         if (verify_refuses != Refusal::none) return answer(Answer::refused, verify_refuses, 23);
+        if (const Refusal r = check(); r != Refusal::none) return answer(Answer::refused, r);
         status.state = static_cast<std::uint16_t>(wire::StoreState::verified);
         return answer(Answer::accepted);
       case wire::Command::commit:
@@ -86,12 +162,9 @@ struct Controller {
           return answer(Answer::accepted);
         }
         if (commit_ends == Answer::accepted) {
-          active = staged;
+          previous = active;
+          activate(staged);
           if (damages_image) active[active.size() / 2] ^= 1U;
-          status.active_slot = 0;
-          status.active_bytes = static_cast<std::uint32_t>(active.size());
-          status.active_sequence = load_u32(active.data() + 12);
-          status.active_crc = load_u32(active.data() + active.size() - 4);
         }
         status.state = static_cast<std::uint16_t>(wire::StoreState::idle);
         answer(overtaken ? Answer::busy : commit_ends);
@@ -101,7 +174,30 @@ struct Controller {
         status.state = static_cast<std::uint16_t>(wire::StoreState::idle);
         return Answer::accepted;
       case wire::Command::rollback:
-        return answer(Answer::no_previous);
+        if (previous.empty()) return answer(Answer::no_previous);
+        if (status.state != static_cast<std::uint16_t>(wire::StoreState::trial) && !may_destroy(command))
+          return answer(Answer::not_authorised);
+        staged = std::exchange(previous, {});
+        activate(staged);
+        return answer(Answer::accepted);
+      case wire::Command::restore_defaults:
+        if (!may_destroy(command)) return answer(Answer::not_authorised);
+        previous.clear();
+        activate({});
+        return answer(Answer::accepted);
+      case wire::Command::unlock:
+        if (!has_unit()) return answer(Answer::unknown_command);
+        if (argument == 0) {
+          unlock_number += 0x1234567;
+          answer(Answer::accepted, Refusal::none, unlock_number);
+          if (numbers_overtaken > 0) {
+            --numbers_overtaken;
+            answer(Answer::wrong_state, Refusal::none, 7);
+          }
+          return Answer::accepted;
+        }
+        unlocked = argument == unlock_number;
+        return answer(unlocked ? Answer::accepted : Answer::not_authorised);
       default:
         return answer(Answer::unknown_command);
     }
@@ -137,6 +233,11 @@ struct Controller {
     wire::encode(now(), order, out.data());
     return out;
   }
+  Bytes unit_record(wire::ByteOrder order) const {
+    Bytes out(wire::unit_record_bytes);
+    wire::encode(unit, order, out.data());
+    return out;
+  }
   Bytes robot_record(wire::ByteOrder order) const {
     Bytes out(wire::robot_record_bytes);
     wire::encode(robot, name.data(), name.size(), order, out.data());
@@ -159,7 +260,8 @@ inline Bytes numbered_image(std::size_t size, std::uint32_t sequence = 1) {
 
 inline host::ClientOptions quick() {
   return {.response_timeout = std::chrono::milliseconds(600),
-          .write_timeout = std::chrono::milliseconds(500)};
+          .write_timeout = std::chrono::milliseconds(500),
+          .staging_timeout = std::chrono::milliseconds(600)};
 }
 
 /// A probe of the controller above comes back with every bit.

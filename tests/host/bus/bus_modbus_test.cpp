@@ -1,31 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The Modbus client against a server made with libmodbus, over TCP and over a pseudo-terminal, which can be told to
 // misbehave.
-#include <arpa/inet.h>
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <modbus/modbus.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <stdlib.h>
-#include <sys/socket.h>
-#include <termios.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <thread>
 
 #include "bus/controller_client.hpp"
 #include "bus/transfer.hpp"
-#include "flexcomp/wire/modbus_map.hpp"
-#include "host/bus/bus_fake_controller.hpp"
+#include "host/bus/bus_fake_modbus.hpp"
 #include "support/thrown.hpp"
 
 namespace flexcomp::host {
 namespace {
 
-namespace map = wire::modbus;
+using fake::ModbusServer;
 using fake::numbered_bytes;
 using fake::numbered_image;
 using fake::quick;
@@ -33,185 +22,6 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using support::thrown;
 using testing::HasSubstr;
-
-/// The register map over the fake controller, in a thread. libmodbus parses requests and builds answers.
-class ModbusServer {
- public:
-  fake::Controller device;
-  std::atomic<bool> silent{false};
-  std::atomic<int> lose{0};                ///< so many answers are lost
-  std::atomic<bool> loses_commits{false};  ///< of commits; over TCP the connection ends with them
-
-  explicit ModbusServer(bool serial) : serial_(serial) {
-    if (serial) {
-      master_ = ::posix_openpt(O_RDWR | O_NOCTTY);
-      EXPECT_EQ(::grantpt(master_), 0);
-      EXPECT_EQ(::unlockpt(master_), 0);
-      device_path = ::ptsname(master_);
-      termios raw{};
-      ::tcgetattr(master_, &raw);
-      ::cfmakeraw(&raw);
-      ::tcsetattr(master_, TCSANOW, &raw);
-      // Never connected: it only builds and parses frames, and talks through the terminal's master side.
-      context_ = modbus_new_rtu(device_path.c_str(), 115200, 'N', 8, 1);
-      modbus_set_slave(context_, 7);
-      modbus_set_socket(context_, master_);
-    } else {
-      listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-      sockaddr_in at{};
-      at.sin_family = AF_INET;
-      at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-      EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
-      EXPECT_EQ(::listen(listener_, 1), 0);
-      socklen_t size = sizeof at;
-      ::getsockname(listener_, reinterpret_cast<sockaddr*>(&at), &size);
-      port = ntohs(at.sin_port);
-      context_ = modbus_new_tcp("127.0.0.1", port);
-    }
-    registers_ = modbus_mapping_new(0, 0, 0x1000, 0);
-    thread_ = std::thread([this] { serial_ ? serve() : accept_and_serve(); });
-  }
-  ~ModbusServer() {
-    stop_ = true;
-    thread_.join();
-    modbus_mapping_free(registers_);
-    modbus_free(context_);
-    if (listener_ >= 0) ::close(listener_);
-    if (master_ >= 0) ::close(master_);
-  }
-
-  BusAddress address() const {
-    if (serial_) return {ModbusRtuAddress{device_path, 115200, Parity::none, 7}};
-    return {ModbusTcpAddress{"127.0.0.1", port, 255}};
-  }
-
-  std::unique_ptr<ControllerClient> client() const { return connect(address(), quick()); }
-
-  std::uint16_t port = 0;
-  std::string device_path;
-
- private:
-  bool ready(int fd) const {
-    pollfd p{fd, POLLIN, 0};
-    while (!stop_) {
-      if (::poll(&p, 1, 5) <= 0) continue;
-      if ((p.revents & POLLIN) != 0) return true;
-      if (!serial_) return false;
-      // Nobody has the line open at the moment.
-      std::this_thread::sleep_for(milliseconds(1));
-    }
-    return false;
-  }
-  void accept_and_serve() {
-    while (ready(listener_)) {
-      const int fd = ::accept(listener_, nullptr, nullptr);
-      modbus_set_socket(context_, fd);
-      serve();
-      ::close(fd);
-    }
-  }
-
-  std::uint16_t* at(unsigned address) { return registers_->tab_registers + address; }
-  void put(unsigned address, const Bytes& bytes) {
-    for (std::size_t k = 0; k < bytes.size(); k += 2) {
-      const unsigned low = k + 1 < bytes.size() ? bytes[k + 1] : 0U;
-      at(address)[k / 2] = static_cast<std::uint16_t>((unsigned{bytes[k]} << 8U) | low);
-    }
-  }
-  std::uint32_t number(unsigned address) { return (std::uint32_t{at(address)[0]} << 16U) | at(address)[1]; }
-  Bytes get(unsigned address, std::size_t size) {
-    Bytes out;
-    for (std::size_t k = 0; k < size; ++k) {
-      out.push_back(
-          static_cast<std::uint8_t>(k % 2 == 0 ? at(address)[k / 2] >> 8U : at(address)[k / 2] & 0xFFU));
-    }
-    return out;
-  }
-
-  void serve() {
-    const int fd = modbus_get_socket(context_);
-    std::uint8_t query[MODBUS_RTU_MAX_ADU_LENGTH + 16];
-    while (ready(fd)) {
-      const int size = modbus_receive(context_, query);
-      if (size == -1 && !serial_) return;
-      if (size <= 0 || silent) continue;
-      answer(query, size);
-    }
-  }
-
-  void answer(const std::uint8_t* query, int size) {
-    const int head = modbus_get_header_length(context_);
-    const std::uint8_t* pdu = query + head;
-    const unsigned address = (unsigned{pdu[1]} << 8U) | pdu[2];
-    constexpr auto big = wire::ByteOrder::big;
-    // What is written is seen first, so that answers to function 23 hold its effect.
-    unsigned to = 0;
-    unsigned count = 0;
-    const std::uint8_t* data = nullptr;
-    if (pdu[0] == 0x10) {
-      to = address;
-      count = pdu[5] / 2U;
-      data = pdu + 6;
-    } else if (pdu[0] == 0x17) {
-      to = (unsigned{pdu[5]} << 8U) | pdu[6];
-      count = pdu[9] / 2U;
-      data = pdu + 10;
-    }
-    for (unsigned k = 0; k < count; ++k) {
-      at(to + k)[0] = static_cast<std::uint16_t>((unsigned{data[2 * k]} << 8U) | data[2 * k + 1]);
-    }
-    wire::Answer answered = wire::Answer::accepted;
-    if (count != 0 && to == map::argument) {
-      answered = device.run(static_cast<wire::Command>(at(map::command)[0]), number(map::argument));
-    } else if (count != 0 && to == map::staging_offset) {
-      const Bytes bytes = get(map::staging_window, 2 * std::size_t{count - 2});
-      const std::size_t from = number(map::staging_offset);
-      for (std::size_t k = 0; k < bytes.size() && from + k < device.staged.size(); ++k) {
-        device.staged[from + k] = bytes[k];
-      }
-    } else if (count != 0 && to == map::reading_offset) {
-      const std::size_t from = number(map::reading_offset);
-      put(map::reading_window,
-          {device.active.begin() + static_cast<std::ptrdiff_t>(from),
-           device.active.begin() + static_cast<std::ptrdiff_t>(std::min(device.active.size(), from + 246))});
-    } else if (count != 0 && to == map::probe_request) {
-      wire::ProbeRequest request;
-      wire::decode(get(map::probe_request, wire::probe_request_bytes).data(), big, request);
-      Bytes response(wire::probe_response_bytes);
-      wire::encode(device.probe(request), big, response.data());
-      put(map::probe_response, response);
-    }
-    put(map::capability, device.capability_record(big));
-    if (count == 0 && address == map::status) put(map::status, device.status_record(big));
-    put(map::robot, device.robot_record(big));
-    if (lose > 0) {
-      --lose;
-      return;
-    }
-    const auto command = static_cast<wire::Command>(at(map::command)[0]);
-    if (loses_commits && to == map::argument && count != 0 && command == wire::Command::commit) {
-      if (!serial_) ::shutdown(modbus_get_socket(context_), SHUT_RDWR);
-      return;
-    }
-    if (answered != wire::Answer::accepted) {
-      modbus_reply_exception(context_, query,
-                             answered == wire::Answer::busy ? MODBUS_EXCEPTION_SLAVE_OR_SERVER_BUSY
-                                                            : MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE);
-    } else if (count == 0 && address >= map::robot && !device.tells_robot) {
-      modbus_reply_exception(context_, query, MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS);
-    } else {
-      modbus_reply(context_, query, size, registers_);
-    }
-  }
-
-  bool serial_;
-  int listener_ = -1;
-  int master_ = -1;
-  modbus_t* context_ = nullptr;
-  modbus_mapping_t* registers_ = nullptr;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
 
 class ModbusClient : public testing::TestWithParam<bool> {
  protected:
@@ -314,6 +124,108 @@ TEST_P(ModbusClient, WaitsForABusyControllerButNotForEver) {
   const RefusedByController e = thrown<RefusedByController>([&] { client->run(wire::Command::verify); });
   EXPECT_EQ(e.answer(), wire::Answer::busy);
   EXPECT_THAT(e.what(), HasSubstr("busy for 0.6 s (Modbus exception 06, server device busy)"));
+}
+
+TEST_P(ModbusClient, WaitsLongerForTheStagingAreaThanForAnAnswer) {
+  server.device.busy = 10;
+  ClientOptions options = quick();
+  options.response_timeout = milliseconds(100);
+  const auto client = connect(server.address(), options);
+  push_image(*client, numbered_image(50));
+  EXPECT_EQ(server.device.active.size(), 50U);
+}
+
+TEST_P(ModbusClient, TellsWhichUnitItIsAndWhomItTrusts) {
+  EXPECT_FALSE(server.client()->unit().has_value());
+  const SigningKey key = SigningKey::generate();
+  server.device.belongs_to("S/N ä-1", {key.public_key()});
+  server.device.unit.counter = 0x1122334455667788;
+  const auto client = server.client();
+  const ControllerUnit unit = *client->unit();
+  EXPECT_EQ(unit.serial, "S/N ä-1");
+  EXPECT_EQ(unit.hash, server.device.unit.unit_hash);
+  EXPECT_EQ(unit.counter, 0x1122334455667788U);
+  EXPECT_EQ(unit.keys, 1U);
+  EXPECT_EQ(unit.key_ids, std::vector{key.id()});
+  EXPECT_EQ(client->robot()->serial, "S/N ä-1");
+  EXPECT_EQ(client->robot()->nominal.unit_hash, unit.hash);
+  // More keys than the record lists, and a serial number that is too long for it.
+  server.device.unit.keys = 9;
+  server.device.unit.serial_size = 0;
+  EXPECT_EQ(client->unit()->key_ids.size(), 4U);
+  EXPECT_EQ(client->unit()->serial, "");
+  EXPECT_EQ(client->robot()->nominal.unit_hash, unit.hash);
+  // A serial number that is not its own, or that would write to the terminal.
+  server.device.unit.serial_size = 7;
+  EXPECT_THAT(thrown<BusError>([&] { client->unit(); }).what(), HasSubstr("does not have the hash"));
+  server.device.belongs_to("\x1b[31mred");
+  EXPECT_THAT(thrown<BusError>([&] { client->robot(); }).what(), testing::Not(HasSubstr("\x1b")));
+}
+
+TEST_P(ModbusClient, UnlocksWhatDestroysSets) {
+  server.device.belongs_to("A-1");
+  const auto fill = [this] {
+    server.device.previous = numbered_image(40, 6);
+    server.device.activate(numbered_image(50, 7));
+  };
+  fill();
+  const auto client = server.client();
+  const RefusedByController e = thrown<RefusedByController>([&] { roll_back(*client); });
+  EXPECT_EQ(e.answer(), wire::Answer::not_authorised);
+  EXPECT_THROW(erase(*client), RefusedByController);
+  EXPECT_EQ(server.device.status.active_sequence, 7U);
+  unlock(*client);
+  EXPECT_EQ(roll_back(*client).active_sequence, 6U);
+  // One unlock, one command.
+  fill();
+  EXPECT_THROW(erase(*client), RefusedByController);
+  // Another client's answer stands where the number was, twice; then for good.
+  server.device.numbers_overtaken = 2;
+  unlock(*client);
+  const wire::Status now = erase(*client);
+  EXPECT_EQ(now.active_slot, wire::no_slot);
+  EXPECT_TRUE(server.device.active.empty() && server.device.previous.empty());
+  server.device.numbers_overtaken = 3;
+  EXPECT_THROW(unlock(*client), RefusedByController);
+  // Nothing there: only the answer says that it was done.
+  EXPECT_THROW(erase(*client), RefusedByController);
+  unlock(*client);
+  EXPECT_NO_THROW(erase(*client));
+}
+
+TEST_P(ModbusClient, RefusesAnotherUnit) {
+  const std::optional<ControllerUnit> none;
+  const auto client = server.client();
+  const std::string serial = "A-1";
+  const Sha256Digest unit = name_hash(serial.data(), serial.size());
+  EXPECT_NO_THROW(refuse_other_unit(*client, none, "c.yaml", {}, ""));
+  EXPECT_THAT(thrown<BusError>([&] { refuse_other_unit(*client, none, "c.yaml", unit, serial); }).what(),
+              testing::AllOf(HasSubstr("unit 'A-1'"), HasSubstr("cannot check"), HasSubstr("update it")));
+  ControllerUnit there;
+  there.serial = "B-2";
+  there.hash = name_hash("B-2", 3);
+  EXPECT_THAT(thrown<BusError>([&] { refuse_other_unit(*client, there, "c.yaml", unit, serial); }).what(),
+              HasSubstr("c.yaml is for unit 'A-1', the controller belongs to unit 'B-2'; nothing was sent"));
+  EXPECT_THAT(
+      thrown<BusError>([&] { refuse_other_unit(*client, ControllerUnit(), "c.yaml", unit, ""); }).what(),
+      testing::AllOf(HasSubstr("SHA-256 " + hex(unit).substr(0, 12)), HasSubstr("without a serial number")));
+  there.hash = unit;
+  EXPECT_NO_THROW(refuse_other_unit(*client, there, "c.yaml", unit, serial));
+}
+
+TEST_P(ModbusClient, SaysWhoIsNotLetIn) {
+  const auto client = server.client();
+  for (const auto& [refusal, words] : {std::pair{Refusal::wrong_unit, "for another unit"},
+                                       {Refusal::not_signed, "only what is signed"},
+                                       {Refusal::unknown_key, "does not trust"},
+                                       {Refusal::wrong_signature, "the signature is wrong"},
+                                       {Refusal::counter_used, "counter is not above"}}) {
+    server.device.verify_refuses = refusal;
+    const RefusedByController e =
+        thrown<RefusedByController>([&] { push_image(*client, numbered_image(100)); });
+    EXPECT_EQ(e.refusal(), refusal);
+    EXPECT_THAT(e.what(), HasSubstr(words));
+  }
 }
 
 TEST_P(ModbusClient, SaysWhoDidNotAnswerAndWhen) {

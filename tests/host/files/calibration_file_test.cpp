@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <utility>
 
 #include "flexcomp/image.hpp"
 #include "model/effects.hpp"
@@ -217,6 +218,34 @@ TEST(Image, RefusesEveryTruncationAndEveryAlteredByte) {
   const Robot other = support::robot("ur5");
   expect_refused([&] { calibration_from_image(image, other, "can:vcan0"); }, 0, "",
                  {"can:vcan0", "another robot"});
+}
+
+TEST(Image, IsBoundToTheUnitThatTheRobotFileNames) {
+  const Calibration c = load(full);
+  Robot here = tx60l();
+  set_serial(here, "A-1");
+  Robot there = tx60l();
+  set_serial(there, "B-2");
+  const auto image = make_image(c, here, 1, {.allow_unnamed = true});
+  const auto unbound = image_of(c);
+  EXPECT_EQ(image_records(image, "i").unit_hash, here.nominal.unit_hash);
+  EXPECT_FALSE(is_given(image_records(unbound, "i").unit_hash));
+  EXPECT_EQ(image[5], 1);
+  EXPECT_EQ(unbound[5], 0);
+  EXPECT_EQ(image.size(), unbound.size() + 36);
+  // The terms are the same; a robot that names no unit reads any, and an image for any unit is read with any.
+  for (const Robot* robot : {&std::as_const(here), &tx60l()}) {
+    Calibration back = calibration_from_image(image, *robot, "bus");
+    EXPECT_EQ(image_of(back), unbound);
+  }
+  EXPECT_NO_THROW(calibration_from_image(unbound, there, "bus"));
+  expect_refused([&] { calibration_from_image(image, there, "a.bin"); }, 0, "",
+                 {"a.bin", hex(here.nominal.unit_hash).substr(0, 12), "not for unit 'B-2'"});
+  EXPECT_EQ(without_signature(image, "i"), image);
+  for (std::size_t size = 0; size < image.size(); ++size) {
+    EXPECT_THROW(image_records(std::span(image).first(size), "i"), InputError) << size;
+    EXPECT_THROW(without_signature(std::span(image).first(size), "i"), InputError) << size;
+  }
 }
 
 TEST(Image, RefusesATableThatSaysItIsLarger) {

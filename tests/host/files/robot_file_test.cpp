@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <random>
 
+#include "model/calibration.hpp"
 #include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 #include "units.hpp"
@@ -73,6 +74,36 @@ TEST(Robot, NameAndJointsAreEnough) {
   EXPECT_EQ(r.gear_ratio[1], 0);
   EXPECT_EQ(r.nominal.reference_temperature_c, 20);
   EXPECT_TRUE(r.reflectors_m.empty());
+}
+
+TEST(Robot, SerialNamesTheUnitAndNotTheArm) {
+  const Robot without = load(good);
+  EXPECT_EQ(without.serial, "");
+  EXPECT_EQ(without.nominal.unit_hash, flexcomp::Sha256Digest{});
+  const auto of = [](const std::string& serial) { return load(good + "serial: " + serial + "\n"); };
+  // printf 'A-4711 ä' | sha256sum
+  const Robot robot = of("'A-4711 ä'");
+  EXPECT_EQ(robot.serial, "A-4711 ä");
+  EXPECT_EQ(hex(robot.nominal.unit_hash), "cbf88eeba2f5a065dde136c652b1b6a3dd800d4dbb743d766f6627751eaf8159");
+  EXPECT_EQ(nominal_hash(robot.nominal), nominal_hash(without.nominal));
+  EXPECT_EQ(of("00471").serial, "00471");
+  EXPECT_EQ(of("'\"\\ #: '").serial, "\"\\ #: ");
+  EXPECT_NO_THROW(of(std::string(44, 'x')));
+  for (const Robot& r : {without, robot, of("'\"\\ #: '"), of("'# x'")}) {
+    const Robot again = parse_robot(robot_text(r, {}), "again");
+    EXPECT_EQ(again.serial, r.serial);
+    EXPECT_EQ(again.nominal.unit_hash, r.nominal.unit_hash);
+  }
+  for (const std::string& bad :
+       {std::string(45, 'x'), std::string("\"a\\nb\""), std::string("\"\\x1b[31m\""),
+        std::string("\"\\x7f\""), std::string("\"a\\u0085\""), std::string("\"a\\0\""),
+        std::string("'") + "é" + std::string(43, 'x') + "'"}) {
+    refused(good + "serial: " + bad + "\n", 9, "serial", {"1 to 44 bytes of UTF-8"});
+  }
+  for (const char* bad : {"''", "~", "[a]", "{a: b}"}) refused(good + "serial: " + bad + "\n", 9, "serial");
+  refused(good + "serial: a\nserial: b\n", 10, "serial");
+  EXPECT_THROW(of("\xff\xfe"), InputError);
+  EXPECT_THROW(of("'a\xc3'"), InputError);
 }
 
 TEST(Robot, MessageNamesFileLineFieldFoundAndExpected) {
