@@ -141,9 +141,11 @@ TEST_F(Authorised, ASignedSetIsPushedAndShown) {
   // Settled without sending: the signature of the file's set would be another one.
   said = done("push --to {bus} --key {key} --robot {robot} {cal} --resume");
   EXPECT_TRUE(commands().empty()) << said.text;
-  EXPECT_THAT(said.text, HasSubstr("another signature"));
+  EXPECT_THAT(said.text, HasSubstr("equal but for its signature"));
   EXPECT_EQ(result()["sent"], false);
   EXPECT_EQ(image_records(device().active, "").counter, first.counter);
+  EXPECT_EQ(result()["bytes"], device().active.size());
+  EXPECT_EQ(result()["outcome"], "active");
   // Another set is sent.
   cal_ = support::write("c2.yaml", "geometric: [{link: 2, a_mm: 0.4}]\n");
   done("push --to {bus} --key {key} --robot {robot} {cal} --resume");
