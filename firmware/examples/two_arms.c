@@ -46,7 +46,7 @@ static flexcomp_storage_result write_slot(void* user, unsigned slot, uint32_t of
 static unsigned permit(void* user, unsigned command, unsigned is_local) {
   const arm_program* arm = (const arm_program*)user;
   (void)is_local;
-  if (!arm->drives_move) return 1;
+  if (!arm->drives_move) return FLEXCOMP_ALLOW;
   return command != FLEXCOMP_COMMAND_COMMIT && command != FLEXCOMP_COMMAND_COMMIT_TRIAL &&
          command != FLEXCOMP_COMMAND_ROLLBACK && command != FLEXCOMP_COMMAND_RESTORE_DEFAULTS;
 }

@@ -143,7 +143,7 @@ typedef struct flexcomp_robot {
   double payload_kg;                    /**< default load */
   double payload_com_m[3];              /**< its centre of mass in F6 */
   double reference_temperature_c;       /**< of the nominal lengths */
-  const char* serial;                   /**< UTF-8, zero-terminated, copied; NULL: none */
+  const char* serial; /**< number of this unit, UTF-8, zero-terminated; copied; NULL: none */
 } flexcomp_robot;
 
 /** Sets a robot without name and links: limits of two turns, gravity (0, 0, -9.8), tool at the flange, no
@@ -269,12 +269,12 @@ typedef enum flexcomp_init_error {
   flexcomp_init_checked(memory, size, robot, settings, storage, error, FLEXCOMP_BUILD_)
 
 /** What program and library have to agree on; for flexcomp_init. */
-#define FLEXCOMP_BUILD_                                                                              \
-  sizeof(flexcomp_real), FLEXCOMP_JOINTS, FLEXCOMP_TERMS, FLEXCOMP_TABLES, FLEXCOMP_TABLE_VALUES,    \
-      FLEXCOMP_STAGING_BYTES,                                                                        \
-      sizeof(flexcomp_robot) + 3 * sizeof(flexcomp_settings) + 5 * sizeof(flexcomp_context) +        \
-          7 * sizeof(flexcomp_storage) + 11 * sizeof(flexcomp_state) + 13 * sizeof(flexcomp_hooks) + \
-          17 * sizeof(flexcomp_diagnostics)
+#define FLEXCOMP_BUILD_                                                                               \
+  sizeof(flexcomp_real), FLEXCOMP_JOINTS, FLEXCOMP_TERMS, FLEXCOMP_TABLES, FLEXCOMP_TABLE_VALUES,     \
+      FLEXCOMP_STAGING_BYTES,                                                                         \
+      sizeof(flexcomp_robot) + 19 * sizeof(flexcomp_trust) + 3 * sizeof(flexcomp_settings) +          \
+          5 * sizeof(flexcomp_context) + 7 * sizeof(flexcomp_storage) + 11 * sizeof(flexcomp_state) + \
+          13 * sizeof(flexcomp_hooks) + 17 * sizeof(flexcomp_diagnostics)
 
 /** What flexcomp_init calls, with the sizes of the caller's compile. `error` may be NULL. Not for calls by hand. */
 flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_robot* robot,
@@ -299,15 +299,25 @@ typedef enum flexcomp_event {
   FLEXCOMP_EVENT_ROLLED_BACK = 7, /**< by command; detail: sequence of the set that is active then, 0: none */
   FLEXCOMP_EVENT_RESTORED = 8,    /**< both slots are erased; detail: 0 */
   FLEXCOMP_EVENT_STORAGE_FAILED = 9, /**< detail: the last accepted command, 0 at the start */
-  FLEXCOMP_EVENT_NOT_AUTHORISED = 10 /**< `permit` refused; detail: the command */
+  /** `permit` refused, or an unlock or a signature was missing; detail: the command. */
+  FLEXCOMP_EVENT_NOT_AUTHORISED = 10,
+  FLEXCOMP_EVENT_UNLOCKED =
+      11 /**< a client of a bus may roll back or restore now; detail: FLEXCOMP_COMMAND_UNLOCK */
 } flexcomp_event;
+
+/** Answer of the hook `permit`; any other number allows. */
+typedef enum flexcomp_permit {
+  FLEXCOMP_REFUSE = 0, /**< the command is answered `not_authorised` (4) and nothing happens */
+  FLEXCOMP_ALLOW = 1,  /**< nothing speaks against it */
+  /** The same; and where it would need an unlock or a signature, this takes their place: for a key switch, or a panel. */
+  FLEXCOMP_AUTHORISE = 2
+} flexcomp_permit;
 
 /** What the program decides and is told of. Either hook may be NULL. Called in the background, from within the
  * call in which it happens; they must not call back into the library. */
 typedef struct flexcomp_hooks {
   void* user; /**< given to both */
-  /** Nonzero where this command of the parameter store is allowed now; otherwise it is answered
-   * `not_authorised` (4) and nothing happens. `command` is a FLEXCOMP_COMMAND_ number. `is_local`: not from a bus,
+  /** Whether this command of the parameter store is allowed now: a flexcomp_permit. `command` is a FLEXCOMP_COMMAND_ number. `is_local`: not from a bus,
    * but by flexcomp_command or a flexcomp_stage_ call. Asked for every command of every bus; a program may, for
    * example, refuse commit, rollback and restore while the drives move. NULL: all are allowed. */
   unsigned (*permit)(void* user, unsigned command, unsigned is_local);
@@ -318,6 +328,26 @@ typedef struct flexcomp_hooks {
 /** Who is asked and told from now on; copied. NULL: nobody. Before flexcomp_boot to hear of the start.
  * BACKGROUND; small. */
 void flexcomp_set_hooks(flexcomp_arm* fc, const flexcomp_hooks* hooks);
+
+/** Whose sets are used: those that are signed (Ed25519, RFC 8032) with one of the keys, bound to this unit, and not
+ * sent before (docs/security.md). */
+typedef struct flexcomp_trust {
+  void* user; /**< given to `check` */
+  /** Public keys, `flexcomp trust` writes them; not copied: they must outlive the arm. */
+  const uint8_t (*keys)[32];
+  unsigned count; /**< of the keys, 0 ... 65535; of more than one each counts */
+  /** A library's or the platform's Ed25519: 1 where the signature (64 bytes) of the message (48 bytes) belongs to the key, 2
+   * where it needs more time (the same call then comes again, with the next poll), any other number where it does
+   * not. */
+  int (*check)(void* user, const uint8_t* public_key, const uint8_t* signature, const uint8_t* message,
+               size_t size);
+} flexcomp_trust;
+
+/** From now on only signed sets are used, from the buses, by flexcomp_stage_commit, and of what is stored; rollback and
+ * FLEXCOMP_COMMAND_RESTORE_DEFAULTS over a bus need a signed command, or `permit` that authorises. Before
+ * flexcomp_boot. 0, and nothing is changed, where `check` or the keys are missing or the robot has no serial number.
+ * BACKGROUND; small, no hook. */
+int flexcomp_set_trust(flexcomp_arm* fc, const flexcomp_trust* trust);
 
 /** Loads the set from storage: the highest valid sequence, else the other one, else none. Once, before the
  * cycle starts. Returns the fault bits of flexcomp_state. BACKGROUND; four calls of `read`, and two images'
@@ -500,6 +530,8 @@ void flexcomp_get_state(const flexcomp_arm* fc, flexcomp_state* state);
 #define FLEXCOMP_COMMAND_ABORT 7
 /** Command of flexcomp_command(): erases both slots; commands are then passed through. */
 #define FLEXCOMP_COMMAND_RESTORE_DEFAULTS 8
+/** Command as the hook `permit` sees it: a client asks to roll back or restore, without a signature. */
+#define FLEXCOMP_COMMAND_UNLOCK 9
 /** A command from local control (an operator panel), numbers as on the wire. Returns the answer; the polls
  * that follow do the work. BACKGROUND; small, but for a rollback one `read` of an image and its check. */
 unsigned flexcomp_command(flexcomp_arm* fc, unsigned command);

@@ -997,8 +997,9 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
       number = heartbeat_time_;
       break;
     case co::identity: {
-      const std::uint32_t values[5] = {4, 0, co::product_code, firmware_version,
-                                       load_u32(device_.robot().name_hash.data())};
+      const Robot& robot = device_.robot();
+      const Sha256Digest& hash = is_given(robot.unit_hash) ? robot.unit_hash : robot.name_hash;
+      const std::uint32_t values[5] = {4, 0, co::product_code, firmware_version, load_u32(hash.data())};
       number = values[sub_];
       break;
     }
@@ -1016,6 +1017,9 @@ std::uint32_t CanopenNode::get(std::uint32_t& size, std::uint8_t* out) {
       return co::abort::none;
     case co::robot:
       device_.robot_record(ByteOrder::little, out);
+      return co::abort::none;
+    case co::unit:
+      wire::encode(device_.unit(), ByteOrder::little, out);
       return co::abort::none;
     case co::certificate:
       wire::encode(device_.certificate(), ByteOrder::little, out);

@@ -14,6 +14,15 @@ constexpr float degrees = 57.29577951F;  // of a radian
 /// Scalar of binary64 bits from the wire.
 Scalar scalar(std::uint64_t bits) { return from_binary64<Scalar>(double_of(bits)); }
 
+/// Copies a text and gives its length. One that is too long for its record is left out: a part of it would be another one.
+template <class Byte>
+std::size_t copy_text(const char* text, Byte* to, std::size_t most) {
+  std::size_t size = 0;
+  if (text == nullptr) return 0;
+  for (; size < most && text[size] != 0; ++size) to[size] = static_cast<Byte>(text[size]);
+  return text[size] == 0 ? size : 0;
+}
+
 }  // namespace
 
 Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings& settings)
@@ -21,13 +30,8 @@ Device::Device(const Robot& robot, const Storage& storage, const DeviceSettings&
       settings_(settings),
       cycle_(robot, sets_, settings.control),
       store_(robot, sets_, storage, settings.store) {
-  if (settings.name == nullptr) return;
-  // A name that is too long for the record is left out: a part of it would be another name.
-  while (name_size_ < name_.size() && settings.name[name_size_] != 0) {
-    name_[name_size_] = settings.name[name_size_];
-    ++name_size_;
-  }
-  if (settings.name[name_size_] != 0) name_size_ = 0;
+  name_size_ = copy_text(settings.name, name_.data(), name_.size());
+  serial_size_ = static_cast<std::uint16_t>(copy_text(settings.serial, serial_.data(), serial_.size()));
 }
 
 void Device::set_hooks(const DeviceHooks& hooks) {
@@ -63,9 +67,12 @@ void Device::poll(std::uint32_t now_ms) {
   if (observe_ != nullptr) observe_(*this);
 }
 
-bool Device::is_permitted(wire::Command command, Origin origin) {
-  denied_ = command != wire::Command::none && hooks_.permit != nullptr &&
-            !hooks_.permit(hooks_.user, command, origin);
+bool Device::is_permitted(wire::Command command, Origin origin, bool& is_authorised) {
+  Permit permit = Permit::allow;
+  if (command != wire::Command::none && hooks_.permit != nullptr)
+    permit = hooks_.permit(hooks_.user, command, origin);
+  denied_ = permit == Permit::refuse;
+  is_authorised = permit == Permit::authorise;
   if (denied_ && observe_ != nullptr)
     hooks_.log(hooks_.user, Event::not_authorised, static_cast<std::uint32_t>(command));
   if (denied_) return false;
@@ -76,15 +83,22 @@ bool Device::is_permitted(wire::Command command, Origin origin) {
 }
 
 wire::Answer Device::run(wire::Command command, std::uint32_t argument, Origin origin) {
-  if (!is_permitted(command, origin)) return wire::Answer::not_authorised;
-  const wire::Answer answer = store_.run(command, argument, origin);
+  bool is_authorised = false;
+  if (!is_permitted(command, origin, is_authorised)) return wire::Answer::not_authorised;
+  const wire::Answer answer = store_.run(command, argument, origin, is_authorised);
+  if (observe_ != nullptr && answer == wire::Answer::not_authorised)
+    hooks_.log(hooks_.user, Event::not_authorised, static_cast<std::uint32_t>(command));
+  if (observe_ != nullptr && answer == wire::Answer::accepted && command == wire::Command::unlock &&
+      argument != 0)
+    hooks_.log(hooks_.user, Event::unlocked, static_cast<std::uint32_t>(command));
   if (answer == wire::Answer::accepted && command != wire::Command::none) seen_.command = command;
   if (observe_ != nullptr) observe_(*this);
   return answer;
 }
 
 wire::Answer Device::begin_unknown(Origin origin) {
-  if (!is_permitted(wire::Command::begin, origin)) return wire::Answer::not_authorised;
+  bool is_authorised = false;
+  if (!is_permitted(wire::Command::begin, origin, is_authorised)) return wire::Answer::not_authorised;
   const wire::Answer answer = store_.begin_unknown(origin);
   if (observe_ != nullptr) observe_(*this);
   return answer;
@@ -183,6 +197,7 @@ wire::Capability Device::capability() const {
   c.scalar_bytes = static_cast<std::uint16_t>(sizeof(Scalar));
   c.schema = static_cast<std::uint16_t>((image::schema_major << 8U) | image::schema_minor);
   c.bases = (1U << basis_count) - 1U;
+  c.flags = wire::capability_flag::unit;
   c.terms = static_cast<std::uint16_t>(FirmwareCapacity::terms);
   c.tables = static_cast<std::uint16_t>(FirmwareCapacity::tables);
   c.values = static_cast<std::uint32_t>(FirmwareCapacity::values);
@@ -213,6 +228,18 @@ wire::Status Device::status() const {
     s.detail = 0;
   }
   return s;
+}
+
+wire::UnitRecord Device::unit() const {
+  wire::UnitRecord r;
+  const Trust& trust = store_.trust();
+  r.unit_hash = robot_.unit_hash;
+  r.counter = store_.counter();
+  r.keys = trust.count;
+  r.serial_size = serial_size_;
+  r.serial = serial_;
+  for (std::size_t k = 0; k < wire::listed_keys && k < trust.count; ++k) r.key_ids[k] = key_id(trust.keys[k]);
+  return r;
 }
 
 wire::CertificateRecord Device::certificate() const {

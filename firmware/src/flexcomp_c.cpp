@@ -51,9 +51,17 @@ struct Arm {
     return result(h.write(h.user, slot, offset, from, size));
   }
 
-  static bool permit(void* user, flexcomp::wire::Command command, fw::Origin origin) {
+  static fw::Permit permit(void* user, flexcomp::wire::Command command, fw::Origin origin) {
     const flexcomp_hooks& h = static_cast<Arm*>(user)->asked;
-    return h.permit(h.user, static_cast<unsigned>(command), origin <= local_staging ? 1U : 0U) != 0;
+    const unsigned answer =
+        h.permit(h.user, static_cast<unsigned>(command), origin <= local_staging ? 1U : 0U);
+    if (answer == FLEXCOMP_REFUSE) return fw::Permit::refuse;
+    return answer == FLEXCOMP_AUTHORISE ? fw::Permit::authorise : fw::Permit::allow;
+  }
+  static int check(void* user, const std::uint8_t* key, const std::uint8_t* signature,
+                   const std::uint8_t* message, std::uint32_t size) {
+    const flexcomp_trust& t = static_cast<Arm*>(user)->trust;
+    return t.check(t.user, key, signature, message, size);
   }
   static void log(void* user, fw::Event event, std::uint32_t detail) {
     const flexcomp_hooks& h = static_cast<Arm*>(user)->asked;
@@ -68,6 +76,7 @@ struct Arm {
 
   const flexcomp_storage hooks;
   flexcomp_hooks asked{};
+  flexcomp_trust trust{};
   fw::Device device;
   const fw::FirmwareContext context;
   fw::Origin origins = local_staging;
@@ -144,12 +153,12 @@ bool are_finite(const fw::Scalar* values, std::size_t count) {
   return true;
 }
 
-/// True where all members after the name, which are doubles, are finite.
+/// True where all members between name and serial number, which are doubles, are finite.
 bool all_finite(const flexcomp_robot& robot) {
-  constexpr std::size_t first = offsetof(flexcomp_robot, links);
-  static_assert((sizeof robot - first) % sizeof(double) == 0, "only doubles");
+  constexpr std::size_t first = offsetof(flexcomp_robot, links), end = offsetof(flexcomp_robot, serial);
+  static_assert((end - first) % sizeof(double) == 0, "only doubles");
   const unsigned char* bytes = reinterpret_cast<const unsigned char*>(&robot) + first;
-  for (std::size_t k = 0; k < (sizeof robot - first) / sizeof(double); ++k) {
+  for (std::size_t k = 0; k < (end - first) / sizeof(double); ++k) {
     double v;
     std::memcpy(&v, bytes + k * sizeof v, sizeof v);
     if (!flexcomp::is_finite(v)) return false;
@@ -157,11 +166,12 @@ bool all_finite(const flexcomp_robot& robot) {
   return true;
 }
 
+flexcomp::Sha256Digest hash_of(const char* text) { return flexcomp::name_hash(text, std::strlen(text)); }
+
 bool take_robot(const flexcomp_robot& from, fw::Robot& to) {
   if (from.name == nullptr || from.name[0] == 0 || !all_finite(from)) return false;
-  std::size_t length = 0;
-  while (from.name[length] != 0) ++length;
-  to.name_hash = flexcomp::name_hash(from.name, length);
+  to.name_hash = hash_of(from.name);
+  if (from.serial != nullptr && from.serial[0] != 0) to.unit_hash = hash_of(from.serial);
   for (std::size_t j = 0; j < fw::joints; ++j) {
     const flexcomp_link& link = from.links[j];
     to.links[j] = {link.theta_rad, link.d_m, link.a_m, link.alpha_rad, link.beta_rad};
@@ -362,6 +372,7 @@ flexcomp_arm* flexcomp_init_checked(void* memory, size_t size, const flexcomp_ro
                     a.instructions, a.link_slope};
   d.store.ranges = {a.payload_kg, a.com_m, a.force_n, a.temperature_k};
   d.name = robot->name;
+  d.serial = robot->serial;
   return reinterpret_cast<flexcomp_arm*>(new (memory) Arm(nominal, storage != nullptr ? *storage : none, d));
 }
 
@@ -395,6 +406,17 @@ void flexcomp_set_hooks(flexcomp_arm* fc, const flexcomp_hooks* hooks) {
   if (arm.asked.permit != nullptr) d.permit = Arm::permit;
   if (arm.asked.log != nullptr) d.log = Arm::log;
   arm.device.set_hooks(d);
+}
+
+int flexcomp_set_trust(flexcomp_arm* fc, const flexcomp_trust* trust) {
+  Arm& arm = arm_of(fc);
+  if (trust->check == nullptr || trust->keys == nullptr || trust->count == 0 || trust->count > 0xFFFF ||
+      !flexcomp::is_given(arm.device.robot().unit_hash)) {
+    return 0;
+  }
+  arm.trust = *trust;
+  arm.device.set_trust({&arm, trust->keys, static_cast<std::uint16_t>(trust->count), Arm::check});
+  return 1;
 }
 
 unsigned flexcomp_boot(flexcomp_arm* fc) {

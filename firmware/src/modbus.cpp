@@ -172,6 +172,9 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
       case Block::certificate:
         wire::encode(device_.certificate(), wire::ByteOrder::big, scratch);
         break;
+      case Block::unit:
+        wire::encode(device_.unit(), wire::ByteOrder::big, scratch);
+        break;
       case Block::staging_window:
         return Exception::illegal_data_address;
     }
@@ -231,6 +234,7 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, con
     case Block::corrections:
     case Block::robot:
     case Block::certificate:
+    case Block::unit:
       break;
   }
   return Exception::illegal_data_address;

@@ -16,20 +16,15 @@ using wire::StoreState;
 
 namespace {
 
-constexpr std::uint32_t seal_bytes = 32;
-constexpr unsigned most_seals = 5;
-constexpr unsigned enough_seals = 3;
-constexpr std::uint32_t begin_offset = slot_bytes - (most_seals + 1U) * seal_bytes;
-constexpr std::uint32_t marks_offset = staging_bytes;
-constexpr unsigned most_marks = (begin_offset - marks_offset) / seal_bytes;
-constexpr std::uint32_t seal_offset(unsigned copy) { return slot_bytes - (copy + 1U) * seal_bytes; }
-constexpr std::uint32_t unit_bytes = 32;    ///< non-volatile memory is written in multiples of this
 constexpr std::uint32_t chunk_bytes = 256;  ///< most bytes per call
-constexpr std::uint8_t seal_magic[4] = {'F', 'L', 'X', 'S'};
-constexpr std::uint8_t mark_magic[4] = {'F', 'L', 'X', 'M'};
-constexpr std::uint8_t begin_magic[4] = {'F', 'L', 'X', 'B'};
 /// A sequence that is farther ahead of the active one is a mistake: it would leave no numbers for those that follow.
 constexpr std::uint32_t most_ahead = 0x10000U;
+/// A client that has been silent for so long gives way to another.
+constexpr std::uint32_t silent_ms = 3000;
+/// For so long, one that was told to wait comes before the one that it waits for.
+constexpr std::uint32_t precedence_ms = 2000;
+/// An unlock or a signed command holds for so long.
+constexpr std::uint32_t permission_ms = 10000;
 constexpr unsigned most_readings = 3;     ///< of what may be a disturbed reading
 constexpr unsigned most_calls = 1000000;  ///< of a hook that is busy, at the start
 // Of one slice of a check. The instructions are those of a Cortex-M7.
@@ -37,9 +32,10 @@ constexpr std::uint32_t checksum_bytes = 1024;  ///< 10 instructions each
 constexpr unsigned records_at_once = 16;        ///< terms; a table counts for as many
 constexpr unsigned bounds_at_once = 4;          ///< terms; a part of a grid counts for as many
 constexpr std::uint32_t probe_poses = 32;       ///< one at a time
-constexpr std::uint32_t shortest_image = image::header_bytes + image::crc_bytes;
 
-std::uint32_t rounded_up(std::uint32_t size) { return (size + unit_bytes - 1U) / unit_bytes * unit_bytes; }
+std::uint32_t rounded_up(std::uint32_t size) {
+  return (size + Slots::unit_bytes - 1U) / Slots::unit_bytes * Slots::unit_bytes;
+}
 
 /// Joint readings spread evenly over the limits: multiples of g^-1 … g^-6 with
 /// g^7 = g + 1 (Roberts' sequence), in 32-bit integers, so that the poses are the same on every target.
@@ -76,7 +72,7 @@ Store::Store(const Robot& robot, ParameterSets& sets, const Storage& storage, co
     : robot_(robot),
       nominal_hash_(flexcomp::nominal_hash(robot)),
       sets_(sets),
-      storage_(storage),
+      slots_(storage),
       settings_(settings) {}
 
 Answer Store::answer(Answer a, std::uint32_t detail) {
@@ -103,159 +99,25 @@ void Store::release() {
 
 // --- start --------------------------------------------------------------------------------------------
 
-bool Store::read_unit(unsigned slot, std::uint32_t offset, std::uint8_t* unit) {
-  return storage_.read != nullptr &&
-         storage_.read(storage_.user, slot, offset, unit, unit_bytes) == StorageResult::done;
-}
-
-namespace {
-
-bool is_erased(const std::uint8_t* unit) {
-  for (std::uint32_t k = 0; k < unit_bytes; ++k) {
-    if (unit[k] != 0xFF) return false;
-  }
-  return true;
-}
-
-bool is_whole(const std::uint8_t* unit, const std::uint8_t* magic) {
-  return std::memcmp(unit, magic, 4) == 0 && crc32(unit, unit_bytes - 4) == load_u32(unit + unit_bytes - 4);
-}
-
-}  // namespace
-
-namespace {
-/// A unit that holds nothing but a generation.
-void make_unit(const std::uint8_t* magic, std::uint32_t generation, std::uint8_t* unit) {
-  std::memset(unit, 0, unit_bytes);
-  std::memcpy(unit, magic, 4);
-  store_u32(unit + 4, generation);
-  store_u32(unit + unit_bytes - 4, crc32(unit, unit_bytes - 4));
-}
-}  // namespace
-
-/// Writes a unit and reads it back. A unit that the power has cut may only look erased: then it fails.
-StorageResult Store::write_unit(unsigned slot, std::uint32_t offset, const std::uint8_t* unit) {
-  if (storage_.write == nullptr) return StorageResult::failed;
-  const StorageResult r = storage_.write(storage_.user, slot, offset, unit, unit_bytes);
-  if (r != StorageResult::done) return r;
-  std::uint8_t back[unit_bytes];
-  return read_unit(slot, offset, back) && std::memcmp(back, unit, unit_bytes) == 0 ? r
-                                                                                   : StorageResult::failed;
-}
-
-/// What the seals of a slot say; false where there is none.
-bool Store::read_seals(unsigned slot, Set& set) {
-  for (unsigned copy = 0; copy < most_seals; ++copy) {
-    std::uint8_t seal[seal_bytes];
-    if (!read_unit(slot, seal_offset(copy), seal) || !is_whole(seal, seal_magic)) continue;
-    const Set found = {Handover::none,
-                       static_cast<std::uint16_t>(slot),
-                       load_u32(seal + 8),
-                       load_u32(seal + 4),
-                       load_u32(seal + 12),
-                       load_u32(seal + 16),
-                       1};
-    if (found.bytes < shortest_image || found.bytes > staging_bytes) continue;
-    if (set.seals == 0) set = found;
-    // Others than the first can only be what is left of an erase.
-    if (found.crc == set.crc && found.generation == set.generation && set.seals < most_seals && copy != 0 &&
-        found.sequence == set.sequence && set.slot == slot) {
-      ++set.seals;
-    }
-  }
-  return set.seals != 0;
-}
-
-/// One more seal, at the next place that looks erased.
-StorageResult Store::add_seal(Set& set) {
-  std::uint8_t seal[seal_bytes] = {};
-  std::memcpy(seal, seal_magic, sizeof seal_magic);
-  store_u32(seal + 4, set.bytes);
-  store_u32(seal + 8, set.sequence);
-  store_u32(seal + 12, set.crc);
-  store_u32(seal + 16, set.generation);
-  store_u32(seal + seal_bytes - 4, crc32(seal, seal_bytes - 4));
-  for (unsigned copy = 0; copy < most_seals; ++copy) {
-    std::uint8_t there[seal_bytes];
-    if (!read_unit(set.slot, seal_offset(copy), there) || !is_erased(there)) continue;
-    const StorageResult r = write_unit(set.slot, seal_offset(copy), seal);
-    if (r == StorageResult::done) ++set.seals;
-    if (r != StorageResult::failed) return r;
-  }
-  return StorageResult::failed;
-}
-
-void Store::read_marks(unsigned slot) {
-  static_assert(std::tuple_size<decltype(Marks::generation)>::value == most_marks, "a place for each mark");
-  Marks& marks = marks_[slot];
-  marks = Marks{};
-  for (unsigned k = 0; k < most_marks; ++k) {
-    std::uint8_t mark[unit_bytes];
-    const bool is_read = read_unit(slot, marks_offset + k * unit_bytes, mark);
-    if (is_read && is_erased(mark)) continue;
-    marks.next = static_cast<std::uint8_t>(k + 1);
-    if (is_read && is_whole(mark, mark_magic)) marks.generation[k] = load_u32(mark + 4);
-    if (marks.generation[k] > generation_) generation_ = marks.generation[k];
-  }
-}
-
-/// Marks in the other slot that void a set.
-unsigned Store::marks_against(const Set& set) const {
-  unsigned count = 0;
-  for (const std::uint32_t generation : marks_[set.slot ^ 1U].generation) {
-    if (generation != 0 && generation >= set.generation) ++count;
-  }
-  return count;
-}
-
-/// One mark that voids the other slot's set, of any generation there has been.
-StorageResult Store::add_mark(unsigned slot) {
-  std::uint8_t mark[unit_bytes];
-  make_unit(mark_magic, generation_, mark);
-  Marks& marks = marks_[slot];
-  while (marks.next < most_marks) {
-    const unsigned k = marks.next;
-    const StorageResult r = write_unit(slot, marks_offset + k * unit_bytes, mark);
-    if (r == StorageResult::busy) return r;
-    ++marks.next;
-    if (r == StorageResult::failed) continue;
-    marks.generation[k] = generation_;
-    return r;
-  }
-  return StorageResult::failed;
-}
-
-/// Generation of the commit that was begun in a slot, whose image may be there; 0: none.
-std::uint32_t Store::begun(unsigned slot) {
-  std::uint8_t unit[unit_bytes];
-  return read_unit(slot, begin_offset, unit) && is_whole(unit, begin_magic) ? load_u32(unit + 4) : 0U;
-}
-
-/// True where no marks void a set: one does not void what two seals say.
-bool Store::is_counted(const Set& set) const {
-  const unsigned against = marks_against(set);
-  return set.seals != 0 && (against == 0 || (against == 1 && set.seals > 1));
-}
-
 void Store::erase_at_start(unsigned slot) {
-  if (storage_.erase == nullptr) return;
+  if (!slots_.is_erasable()) return;
   for (unsigned n = 0; n < most_calls; ++n) {
-    const StorageResult r = storage_.erase(storage_.user, slot);
+    const StorageResult r = slots_.erase(slot);
     if (r == StorageResult::busy) continue;
     if (r == StorageResult::failed) faults_ |= wire::fault::storage;
     break;
   }
-  marks_[slot] = Marks{};
 }
 
 /// Reads a sealed image into the staging memory, which must be idle, and prepares it in model set.index.
-bool Store::load(const Set& set) {
+bool Store::load(const StoredSet& set) {
   for (unsigned reading = 0; reading < most_readings; ++reading) {
-    if (storage_.read(storage_.user, set.slot, 0, staging_.data(), set.bytes) != StorageResult::done) {
+    if (slots_.read(set.slot, 0, staging_.data(), set.bytes) != StorageResult::done) {
       faults_ |= wire::fault::storage;
       continue;
     }
     begin_check(set.bytes, set.index);
+    purpose_ = Purpose::start;
     Refusal r = Refusal::none;
     std::uint32_t detail = 0;
     while (!check_slice(r, detail)) {
@@ -267,27 +129,22 @@ bool Store::load(const Set& set) {
 }
 
 /// True where the image that was checked is the one that the seal was written for.
-bool Store::is_in_staging(const Set& set) const {
+bool Store::is_in_staging(const StoredSet& set) const {
   return header_.sequence == set.sequence && load_u32(staging_.data() + set.bytes - 4) == set.crc;
 }
 
 void Store::boot() {
-  std::array<Set, 2> found{};
-  for (unsigned slot = 0; slot < 2; ++slot) {
-    found[slot].slot = static_cast<std::uint16_t>(slot);
-    read_seals(slot, found[slot]);
-    if (found[slot].generation > generation_) generation_ = found[slot].generation;
-  }
-  for (unsigned slot = 0; slot < 2; ++slot) read_marks(slot);
-  const Set &a = found[0], &b = found[1];
+  std::array<StoredSet, 2> found{};
+  slots_.survey(found);
+  const StoredSet &a = found[0], &b = found[1];
   // Sets of before there were generations have none: their sequences tell.
   const bool second =
       b.generation != a.generation ? b.generation > a.generation : is_ahead(b.sequence, a.sequence);
   const unsigned newest = second ? 1 : 0;
   bool damaged = false;
   for (const unsigned slot : {newest, newest ^ 1U}) {
-    Set& set = found[slot];
-    if (!is_counted(set)) continue;
+    StoredSet& set = found[slot];
+    if (!slots_.is_counted(set)) continue;
     if (active_.index != Handover::none) {
       // The other slot is checked for a later rollback, which prepares its model again.
       set.index = 1;
@@ -312,22 +169,22 @@ void Store::boot() {
 }
 
 /// A seal of a set, or without one a mark in a slot, however long the memory takes; false where it fails.
-bool Store::add_at_start(Set* set, unsigned slot) {
+bool Store::add_at_start(StoredSet* set, unsigned slot) {
   StorageResult r = StorageResult::busy;
   for (unsigned n = 0; n < most_calls && r == StorageResult::busy; ++n) {
-    r = set != nullptr ? add_seal(*set) : add_mark(slot);
+    r = set != nullptr ? slots_.add_seal(*set) : slots_.add_mark(slot);
   }
   return r == StorageResult::done;
 }
 
 /// Makes the choice of this start that of every later one, before anything follows from it.
-void Store::settle_start(const std::array<Set, 2>& found) {
-  if (storage_.write == nullptr) return;
+void Store::settle_start(const std::array<StoredSet, 2>& found) {
+  if (!slots_.is_writable()) return;
   if (active_.slot != wire::no_slot) {
     // Marks that do not suffice to void this set may be all that is left of a restore that was cut.
     const unsigned other = active_.slot ^ 1U;
-    const unsigned against = marks_against(active_);
-    const unsigned wanted = active_.seals < enough_seals ? active_.seals + 2U : active_.seals;
+    const unsigned against = slots_.marks_against(active_);
+    const unsigned wanted = active_.seals < Slots::enough_seals ? active_.seals + 2U : active_.seals;
     if (against != 0 && found[other].seals == 0) erase_at_start(other);
     // Those that are there may all be marginal; two that are whole outlast a mark that is.
     while (active_.seals < wanted && add_at_start(&active_, 0)) {
@@ -337,16 +194,17 @@ void Store::settle_start(const std::array<Set, 2>& found) {
   for (unsigned slot = 0; slot < 2; ++slot) {
     if (slot == active_.slot || slot == previous_.slot) continue;
     // As it was read when the choice was made: it may read otherwise by now.
-    Set seen = found[slot];
+    StoredSet seen = found[slot];
     const bool is_sealed = seen.seals != 0;
     // A sealed set that this firmware refuses keeps its place where there is no other.
-    if (is_sealed && active_.slot == wire::no_slot && is_counted(seen)) continue;
-    const std::uint32_t commit = begun(slot);
+    if (is_sealed && active_.slot == wire::no_slot && slots_.is_counted(seen)) continue;
+    const std::uint32_t commit = slots_.begun(slot);
     if (!is_sealed || commit > seen.generation) seen.generation = commit;
     if (seen.generation <= active_.generation) continue;
-    if (seen.generation > generation_) generation_ = seen.generation;
+    slots_.note_generation(seen.generation);
     bool is_void = true;
-    while (is_void && marks_against(seen) < 3) is_void = add_at_start(nullptr, slot ^ 1U);
+    while (is_void && slots_.marks_against(seen) < Slots::enough_marks)
+      is_void = add_at_start(nullptr, slot ^ 1U);
     if (!is_void) erase_at_start(slot);
   }
 }
@@ -375,7 +233,14 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
   detail = 0;
   switch (check_) {
     case Check::header:
+      is_command_ = check_signature_ != nullptr && purpose_ == Purpose::verify &&
+                    looks_like_command(image, check_bytes_);
+      if (is_command_) {
+        check_ = Check::signature;
+        return check_signature_(*this, true, r);
+      }
       r = read_header(image, check_bytes_, header_);
+      if (r == Refusal::none && header_.joints != joints) r = Refusal::wrong_nominal;
       if (r == Refusal::schema) detail = header_.schema_major;
       if (r == Refusal::truncated || r == Refusal::bad_length) detail = header_.total_bytes;
       if (r != Refusal::none) return true;
@@ -390,12 +255,17 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       if (progress_ != end) return false;
       r = check_crc_ != load_u32(image + end) ? Refusal::checksum
                                               : check_binding(header_, nominal_hash_, robot_.name_hash);
-      if (r != Refusal::none) return true;
+      if (r == Refusal::none) r = check_unit(image, check_bytes_, robot_.unit_hash);
+      if (r != Refusal::none || (check_signature_ != nullptr && check_signature_(*this, true, r))) return true;
       begin_model(robot_, model);
       cursor_ = {};
-      check_ = Check::records;
+      check_ = check_signature_ != nullptr ? Check::signature : Check::records;
       return false;
     }
+    case Check::signature:
+      if (!check_signature_(*this, false, r)) return false;
+      check_ = Check::records;
+      return r != Refusal::none || is_command_;
     case Check::records:
       for (unsigned n = 0; n < records_at_once && !at_end(cursor_, check_bytes_); ++n) {
         if (load_u16(image + cursor_.at) == image::record_table) {
@@ -456,6 +326,47 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
   return true;
 }
 
+void Store::set_trust(const Trust& trust) {
+  trust_ = trust;
+  check_signature_ = trust.count != 0 ? check_signature : nullptr;
+}
+
+bool Store::check_signature(Store& store, bool begins, Refusal& r) {
+  if (!begins) return store.signature_.advance(store.trust_, r);
+  r = store.begin_signature();
+  return r != Refusal::none;
+}
+
+/// Whether what is in the staging memory has a signature that could count here: bound to this unit, by a trusted key, with a counter
+/// that was not used.
+Refusal Store::begin_signature() {
+  const std::uint8_t* bytes = staging_.data();
+  const std::uint8_t* id = nullptr;
+  std::uint32_t end = signing::command_signature;
+  Signed what = Signed::command;
+  if (is_command_) {
+    SignedCommand command;
+    const Refusal r = decode(bytes, check_bytes_, command);
+    if (r != Refusal::none) return r;
+    if (command.unit_hash != robot_.unit_hash) return Refusal::wrong_unit;
+    if (command.active_crc != active_.crc) return Refusal::stale_sequence;
+    check_counter_ = command.counter;
+    id = bytes + signing::command_key_id;
+  } else {
+    const std::uint8_t* record = signature_of(bytes, check_bytes_);
+    if (record == nullptr || load_u32(record) != signing::ed25519 ||
+        bound_unit(bytes, check_bytes_) == nullptr)
+      return Refusal::not_signed;
+    check_counter_ = load_u64(record + signing::record_counter);
+    id = record + signing::record_key_id;
+    end = static_cast<std::uint32_t>(signature_offset(check_bytes_));
+    what = Signed::set;
+  }
+  const bool is_new = purpose_ == Purpose::verify || purpose_ == Purpose::commit;
+  if (is_new && check_counter_ <= slots_.counter()) return Refusal::counter_used;
+  return signature_.begin(trust_, what, bytes, end, id);
+}
+
 /// True where the set moves the tool by no more than the plausible change at one of the probe poses, which are spread over
 /// the joint limits.
 bool Store::plausible(const FirmwareModel& model, std::uint32_t pose, std::uint32_t& detail) const {
@@ -484,11 +395,18 @@ bool Store::plausible(const FirmwareModel& model, std::uint32_t pose, std::uint3
 void Store::checked(Refusal r, std::uint32_t detail) {
   if (purpose_ == Purpose::rollback) {
     if (r != Refusal::none || !is_in_staging(incoming_)) {
-      previous_ = Set{};
+      previous_ = StoredSet{};
       finish(Answer::no_previous);
       return;
     }
     begin_commit();
+    return;
+  }
+  if (is_command_ && r == Refusal::none) {
+    permission_ = {owner_, static_cast<Command>(load_u16(staging_.data() + signing::command_number)), 0,
+                   now_ms_};
+    slots_.note_counter(check_counter_);
+    finish(Answer::accepted);
     return;
   }
   const std::uint32_t ahead = header_.sequence - active_.sequence;
@@ -520,10 +438,31 @@ void Store::checked(Refusal r, std::uint32_t detail) {
 
 // --- staging ------------------------------------------------------------------------------------------
 
+/// Whether a client that would begin a transfer has to wait for another one: each gets its turn, whoever hogs.
+bool Store::must_wait(Origin origin) {
+  const auto passed = [this](std::uint32_t since_ms) { return now_ms_ - since_ms; };
+  if (waiting_ != nobody && passed(waiting_ms_) >= precedence_ms) waiting_ = nobody;
+  const bool is_free = state_ == StoreState::idle || owns(origin);
+  const bool has_stalled =
+      (!touched_ && passed(touched_ms_) >= silent_ms) || passed(began_ms_) >= settings_.staging_timeout_ms;
+  if (is_free ? waiting_ != nobody && waiting_ != origin && origin == last_owner_ : !has_stalled) {
+    if (is_free) {
+      release();
+    } else {
+      waiting_ = origin;
+      waiting_ms_ = now_ms_;
+    }
+    return true;
+  }
+  if (waiting_ == origin) waiting_ = nobody;
+  return false;
+}
+
 Answer Store::begin(std::uint32_t length, Origin origin) {
   if (state_ == StoreState::trial) return answer(Answer::wrong_state);
-  if (state_ == StoreState::working || (state_ != StoreState::idle && !owns(origin)))
-    return answer(Answer::busy);
+  if (state_ == StoreState::working || must_wait(origin)) return answer(Answer::busy);
+  if (state_ == StoreState::idle || !owns(origin)) began_ms_ = now_ms_;
+  last_owner_ = origin;
   release();
   if (length > staging_bytes) return refuse(Refusal::too_long, staging_bytes);
   if (length == 0) return answer(Answer::bad_argument);
@@ -551,8 +490,11 @@ Answer Store::write(std::uint32_t offset, const std::uint8_t* bytes, std::uint32
     return answer(Answer::bad_argument, announced_);
   }
   std::memcpy(staging_.data() + offset, bytes, size);
-  if (offset + size > staged_) staged_ = offset + size;
-  touched_ = true;
+  // What has arrived before is no progress.
+  if (offset + size > staged_) {
+    staged_ = offset + size;
+    touched_ = true;
+  }
   return answer(Answer::accepted);
 }
 
@@ -609,6 +551,7 @@ void Store::disconnect(Origin origin) {
 Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
   // A client that asked for verify may ask for commit before that has ended: it then follows by itself.
   const bool checking = is_verifying() && owns(origin);
+  if (checking && check_ != Check::header && is_command_) return answer(Answer::wrong_state);
   const bool unverified = state_ == StoreState::receiving || checking;
   if (checking) {
     touched_ = true;
@@ -620,7 +563,7 @@ Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
     if (state_ != StoreState::verified) return answer(Answer::wrong_state);
     if (!owns(origin)) return answer(Answer::busy);
   }
-  if (storage_.read == nullptr || storage_.erase == nullptr || storage_.write == nullptr) {
+  if (!slots_.is_readable() || !slots_.is_erasable() || !slots_.is_writable()) {
     finish(Answer::storage_failed);
     return Answer::storage_failed;
   }
@@ -636,35 +579,19 @@ Answer Store::commit(Origin origin, bool trial, std::uint32_t cycles) {
   return answer(Answer::accepted);
 }
 
-/// The slot for a new set: where none is in use the one that the other's marks void, so that the marks outlast it.
-std::uint16_t Store::target_slot() {
-  if (active_.slot != wire::no_slot) return static_cast<std::uint16_t>(active_.slot ^ 1U);
-  for (std::uint16_t slot = 0; slot < 2; ++slot) {
-    Set seen;
-    seen.slot = slot;
-    const bool is_sealed = read_seals(slot, seen);
-    if ((is_sealed && !is_counted(seen)) || (!is_sealed && begun(slot) != 0)) return slot;
-  }
-  for (std::uint16_t slot = 0; slot < 2; ++slot) {
-    for (const std::uint32_t mark : marks_[slot ^ 1U].generation) {
-      if (mark != 0) return slot;
-    }
-  }
-  return 0;
-}
-
 /// Starts to write what was verified.
 void Store::begin_commit() {
-  incoming_.slot = target_slot();
+  incoming_.slot = slots_.target(active_.slot);
   incoming_.seals = 0;
-  incoming_.generation = ++generation_;
+  incoming_.generation = slots_.next_generation();
   state_ = StoreState::working;
   job_ = active_.slot == wire::no_slot ? Job::erase : Job::check_active;
   progress_ = 0;
   check_crc_ = 0;
   faults_ = static_cast<std::uint16_t>(faults_ & ~wire::fault::trial_reverted);
   // From here on the other slot holds nothing that a rollback could use.
-  previous_ = Set{};
+  previous_ = StoredSet{};
+  if (check_signature_ != nullptr && !job_trial_) slots_.note_counter(check_counter_);
 }
 
 Answer Store::confirm() {
@@ -685,13 +612,13 @@ Answer Store::rollback() {
   if (state_ == StoreState::trial) {
     // The trial has no seal, so nothing needs to be erased.
     make_active(previous_);
-    previous_ = Set{};
+    previous_ = StoredSet{};
     state_ = StoreState::idle;
     return answer(Answer::accepted);
   }
   if (state_ != StoreState::idle) return answer(Answer::busy);
   if (previous_.slot == wire::no_slot) return answer(Answer::no_previous);
-  if (storage_.erase == nullptr || storage_.write == nullptr) return answer(Answer::storage_failed);
+  if (!slots_.is_erasable() || !slots_.is_writable()) return answer(Answer::storage_failed);
   std::uint32_t index = 0;
   if (!free_model(index)) return answer(Answer::busy);
   job_trial_ = false;
@@ -707,17 +634,54 @@ Answer Store::rollback() {
 Answer Store::restore() {
   if (state_ == StoreState::trial) return answer(Answer::wrong_state);
   if (state_ != StoreState::idle) return answer(Answer::busy);
-  if (storage_.erase == nullptr) return answer(Answer::storage_failed);
+  if (!slots_.is_erasable()) return answer(Answer::storage_failed);
   state_ = StoreState::working;
-  incoming_ = Set{};
-  incoming_.slot = target_slot();
+  incoming_ = StoredSet{};
+  incoming_.slot = slots_.target(active_.slot);
   job_ = Job::clear_other;
-  previous_ = Set{};
+  previous_ = StoredSet{};
   return answer(Answer::accepted);
 }
 
-Answer Store::run(Command command, std::uint32_t argument, Origin origin) {
+/// An unlock in two steps, so that no single frame, and none that was recorded, opens what destroys sets.
+Answer Store::unlock(std::uint32_t argument, Origin origin) {
+  if (trust_.count != 0) return answer(Answer::not_authorised, wire::needs_signature);
+  if (argument == 0) {
+    const std::uint32_t seed[2] = {++challenges_, now_ms_};
+    std::uint8_t bytes[sizeof seed];
+    std::memcpy(bytes, seed, sizeof seed);
+    permission_ = {origin, Command::none, crc32(bytes, sizeof bytes) | 1U, now_ms_};
+    return answer(Answer::accepted, permission_.challenge);
+  }
+  const bool is_right = permission_.origin == origin && permission_.challenge == argument;
+  permission_.challenge = 0;
+  if (is_right) return answer(Answer::accepted);
+  permission_ = Permission{};
+  return answer(Answer::not_authorised, wire::needs_unlock);
+}
+
+/// Whether a client may run a command that destroys sets.
+bool Store::has_permission(Command command, Origin origin) const {
+  return permission_.origin == origin && permission_.challenge == 0 &&
+         now_ms_ - permission_.since_ms < permission_ms &&
+         (permission_.command == command || (permission_.command == Command::none && trust_.count == 0));
+}
+
+Answer Store::run(Command command, std::uint32_t argument, Origin origin, bool is_authorised) {
   watch_trial();
+  const bool destroys =
+      command == Command::restore_defaults || (command == Command::rollback && state_ != StoreState::trial);
+  if (destroys && origin != nobody && !is_authorised && !has_permission(command, origin))
+    return answer(Answer::not_authorised, trust_.count != 0 ? wire::needs_signature : wire::needs_unlock);
+  const Answer a = execute(command, argument, origin);
+  // It is for one command, and for the next one.
+  if (permission_.origin == origin && command != Command::none && command != Command::unlock &&
+      a != Answer::busy)
+    permission_ = Permission{};
+  return a;
+}
+
+Answer Store::execute(Command command, std::uint32_t argument, Origin origin) {
   switch (command) {
     case Command::none:
       break;
@@ -737,13 +701,15 @@ Answer Store::run(Command command, std::uint32_t argument, Origin origin) {
       return drop(origin);
     case Command::restore_defaults:
       return restore();
+    case Command::unlock:
+      return unlock(argument, origin);
   }
   return answer(Answer::unknown_command, static_cast<std::uint32_t>(command));
 }
 
 // --- background ---------------------------------------------------------------------------------------
 
-void Store::make_active(const Set& set) {
+void Store::make_active(const StoredSet& set) {
   sets_.handover.activate(set.index);
   active_ = set;
   if (set.index != Handover::none) {
@@ -769,7 +735,7 @@ void Store::watch_trial() {
   if (state_ != StoreState::trial || !sets_.handover.settled() || !sets_.handover.reverted()) return;
   // The cycle has reverted by itself: there is no request to post.
   active_ = previous_;
-  previous_ = Set{};
+  previous_ = StoredSet{};
   if (active_.index == Handover::none) faults_ |= wire::fault::no_valid_set;
   faults_ |= wire::fault::trial_reverted;
   finish(Answer::reverted);
@@ -783,10 +749,9 @@ void Store::work() {
     case Job::load: {
       const std::uint32_t left = incoming_.bytes - progress_;
       const std::uint32_t size = left < chunk_bytes ? left : chunk_bytes;
-      if (storage_.read(storage_.user, incoming_.slot, progress_, staging_.data() + progress_, size) !=
-          StorageResult::done) {
+      if (slots_.read(incoming_.slot, progress_, staging_.data() + progress_, size) != StorageResult::done) {
         faults_ |= wire::fault::storage;
-        previous_ = Set{};
+        previous_ = StoredSet{};
         finish(Answer::no_previous);
         return;
       }
@@ -808,7 +773,7 @@ void Store::work() {
       std::uint8_t chunk[chunk_bytes];
       const std::uint32_t end = active_.bytes - std::uint32_t{image::crc_bytes};
       const std::uint32_t size = end - progress_ < chunk_bytes ? end - progress_ : chunk_bytes;
-      r = storage_.read(storage_.user, active_.slot, progress_, chunk, size);
+      r = slots_.read(active_.slot, progress_, chunk, size);
       if (r != StorageResult::done) break;
       check_crc_ = crc32(chunk, size, check_crc_);
       progress_ += size;
@@ -819,22 +784,19 @@ void Store::work() {
       break;
     }
     case Job::erase:
-      r = storage_.erase(storage_.user, incoming_.slot);
+      r = slots_.erase(incoming_.slot);
       if (r == StorageResult::failed) break;
-      marks_[incoming_.slot] = Marks{};
       if (r == StorageResult::done) job_ = Job::announce;
       break;
     case Job::announce: {
-      std::uint8_t unit[unit_bytes];
-      make_unit(begin_magic, incoming_.generation, unit);
-      r = write_unit(incoming_.slot, begin_offset, unit);
+      r = slots_.announce(incoming_);
       if (r == StorageResult::done) job_ = Job::write;
       break;
     }
     case Job::write: {
       const std::uint32_t end = rounded_up(incoming_.bytes);
       const std::uint32_t size = end - progress_ < chunk_bytes ? end - progress_ : chunk_bytes;
-      r = storage_.write(storage_.user, incoming_.slot, progress_, staging_.data() + progress_, size);
+      r = slots_.write(incoming_.slot, progress_, staging_.data() + progress_, size);
       if (r == StorageResult::done) progress_ += size;
       if (progress_ == end) {
         progress_ = 0;
@@ -846,7 +808,7 @@ void Store::work() {
       std::uint8_t chunk[chunk_bytes];
       const std::uint32_t left = incoming_.bytes - progress_;
       const std::uint32_t size = left < chunk_bytes ? left : chunk_bytes;
-      r = storage_.read(storage_.user, incoming_.slot, progress_, chunk, size);
+      r = slots_.read(incoming_.slot, progress_, chunk, size);
       if (r == StorageResult::busy) r = StorageResult::failed;
       if (r == StorageResult::done && std::memcmp(chunk, staging_.data() + progress_, size) != 0) {
         r = StorageResult::failed;
@@ -875,19 +837,20 @@ void Store::work() {
       }
       job_trial_ = true;
       job_ = Job::seal;
+      if (check_signature_ != nullptr) slots_.note_counter(check_counter_);
       break;
     case Job::seal:
-      r = add_seal(incoming_);
+      r = slots_.add_seal(incoming_);
       // With one seal the set counts, and the next start adds another.
       if (r == StorageResult::failed && incoming_.seals != 0)
         r = StorageResult::done;
-      else if (r == StorageResult::done && incoming_.seals < enough_seals)
+      else if (r == StorageResult::done && incoming_.seals < Slots::enough_seals)
         break;
       if (r == StorageResult::failed) {
         // It may be incomplete: the active set must be the one that the next start would load.
         if (job_trial_) {
           make_active(previous_);
-          previous_ = Set{};
+          previous_ = StoredSet{};
         }
         progress_ = 0;
         job_ = Job::void_incoming;
@@ -898,7 +861,7 @@ void Store::work() {
       if (job_rollback_) {
         job_ = active_.slot == wire::no_slot ? Job::none : Job::drop_left;
         make_active(incoming_);
-        previous_ = Set{};
+        previous_ = StoredSet{};
         if (job_ == Job::none) finish(Answer::accepted);
         break;
       }
@@ -912,37 +875,36 @@ void Store::work() {
       finish(Answer::accepted);
       break;
     case Job::void_incoming:
-      r = add_mark(incoming_.slot ^ 1U);
+      r = slots_.add_mark(incoming_.slot ^ 1U);
       if (r == StorageResult::busy) break;
-      if (r == StorageResult::failed || ++progress_ == 3) job_ = Job::drop_incoming;
+      if (r == StorageResult::failed || ++progress_ == Slots::enough_marks) job_ = Job::drop_incoming;
       r = StorageResult::done;
       break;
     case Job::drop_incoming:
-      r = storage_.erase(storage_.user, incoming_.slot);
+      r = slots_.erase(incoming_.slot);
       if (r == StorageResult::done) r = StorageResult::failed;  // the commit has failed in any case
       break;
     case Job::drop_left:
-      r = storage_.erase(storage_.user, active_.slot ^ 1U);
+      r = slots_.erase(active_.slot ^ 1U);
       if (r == StorageResult::busy) break;
       if (r == StorageResult::failed) faults_ |= wire::fault::storage;
       finish(Answer::accepted);
       return;
     case Job::clear_other:
-      r = storage_.erase(storage_.user, incoming_.slot);
+      r = slots_.erase(incoming_.slot);
       if (r != StorageResult::done) break;
-      marks_[incoming_.slot] = Marks{};
       progress_ = 0;
-      job_ = active_.slot == wire::no_slot ? Job::clear_active : Job::void_active;
+      // Without a set the marks are there for the counter alone.
+      job_ = active_.slot == wire::no_slot && slots_.counter() == 0 ? Job::clear_active : Job::void_active;
       break;
     case Job::void_active:
-      r = add_mark(incoming_.slot);
-      if (r == StorageResult::done && ++progress_ == 3) job_ = Job::clear_active;
+      r = slots_.add_mark(incoming_.slot);
+      if (r == StorageResult::done && ++progress_ == Slots::enough_marks) job_ = Job::clear_active;
       break;
     case Job::clear_active:
-      r = storage_.erase(storage_.user, incoming_.slot ^ 1U);
+      r = slots_.erase(incoming_.slot ^ 1U);
       if (r != StorageResult::done) break;
-      marks_[incoming_.slot ^ 1U] = Marks{};
-      make_active(Set{});
+      make_active(StoredSet{});
       faults_ = wire::fault::no_valid_set;
       finish(Answer::accepted);
       break;
@@ -951,6 +913,7 @@ void Store::work() {
 }
 
 void Store::poll(std::uint32_t now_ms) {
+  now_ms_ = now_ms;
   if (touched_) {
     touched_ = false;
     touched_ms_ = now_ms;
@@ -965,11 +928,11 @@ void Store::poll(std::uint32_t now_ms) {
 }
 
 bool Store::read_active(std::uint32_t offset, std::uint8_t* to, std::uint32_t size) {
-  if (active_.slot == wire::no_slot || storage_.read == nullptr) return false;
+  if (active_.slot == wire::no_slot || !slots_.is_readable()) return false;
   // Rollback and restore are erasing just this slot.
   if (job_ == Job::clear_active) return false;
   if (offset > active_.bytes || size > active_.bytes - offset) return false;
-  if (storage_.read(storage_.user, active_.slot, offset, to, size) != StorageResult::done) {
+  if (slots_.read(active_.slot, offset, to, size) != StorageResult::done) {
     faults_ |= wire::fault::storage;
     return false;
   }

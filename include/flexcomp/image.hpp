@@ -63,6 +63,7 @@ constexpr std::uint16_t optional_record = 0x8000;  ///< bit of a type: may be sk
 struct ImageHeader {
   std::uint8_t schema_major = image::schema_major;  ///< another one is refused
   std::uint8_t schema_minor = image::schema_minor;  ///< a higher one only adds
+  std::uint8_t joints = 6;                          ///< of the robot
   std::uint32_t total_bytes = 0;                    ///< header … CRC
   std::uint32_t sequence = 0;                       ///< a newer set has a higher one
   Sha256Digest nominal_hash{};                      ///< of the geometry, nominal_hash()
@@ -183,9 +184,41 @@ inline Refusal read_header(const std::uint8_t* bytes, std::size_t size, ImageHea
   header.terms = load_u16(bytes + 80);
   header.tables = load_u16(bytes + 82);
   header.values = load_u32(bytes + 84);
+  header.joints = bytes[92] != 0 ? bytes[92] : std::uint8_t{6};
   if (header.total_bytes > size) return Refusal::truncated;
   if (header.total_bytes != size) return Refusal::bad_length;
   return Refusal::none;
+}
+
+/// Hash of the serial number that an image of `size` bytes, accepted by read_header(), is bound to; null where it is bound to
+/// none.
+inline const std::uint8_t* bound_unit(const std::uint8_t* bytes, std::size_t size) {
+  const std::uint8_t* p = bytes + image::header_bytes;
+  const bool is_there =
+      size >= image::header_bytes + image::record_head_bytes + image::unit_bytes + image::crc_bytes &&
+      load_u16(p) == image::record_unit && load_u16(p + 2) == image::unit_bytes;
+  return is_there ? p + image::record_head_bytes : nullptr;
+}
+
+/// Whether an image is for the unit with this hash of its serial number (zeros: it has none), or for any.
+inline Refusal check_unit(const std::uint8_t* bytes, std::size_t size, const Sha256Digest& unit_hash) {
+  const std::uint8_t* bound = bound_unit(bytes, size);
+  if (bound == nullptr) return Refusal::none;
+  if (!is_given(unit_hash)) return Refusal::wrong_unit;
+  for (std::size_t k = 0; k < image::unit_bytes; ++k) {
+    if (bound[k] != unit_hash[k]) return Refusal::wrong_unit;
+  }
+  return Refusal::none;
+}
+
+/// What the signature record of an image of `size` bytes, accepted by read_header(), holds (signature.hpp); null where it is
+/// not signed.
+inline const std::uint8_t* signature_of(const std::uint8_t* bytes, std::size_t size) {
+  constexpr std::size_t last = image::record_head_bytes + image::signature_bytes + image::crc_bytes;
+  const std::uint8_t* p = bytes + size - last;
+  const bool is_there = size >= image::header_bytes + last && load_u16(p) == image::record_signature &&
+                        load_u16(p + 2) == image::signature_bytes;
+  return is_there ? p + image::record_head_bytes : nullptr;
 }
 
 /// Whether an image is for this robot.
@@ -224,8 +257,6 @@ struct ImageCursor {
   std::size_t terms = 0;                 ///< so far
   std::size_t tables = 0;                ///< so far
   std::size_t values = 0;                ///< of all tables so far
-  std::size_t unit = 0;                  ///< offset of the hash that the unit record holds; 0: none so far
-  std::size_t signature = 0;             ///< offset of what the signature record holds; 0: none so far
 };
 
 /// True where all records of an image of `size` bytes have been read.
@@ -285,29 +316,15 @@ inline Refusal visit_record(const std::uint8_t* bytes, std::size_t size, ImageCu
     ++cursor.tables;
     return visitor.table(t, body + image::table_head_bytes);
   }
+  // Read by bound_unit() and signature_of(): here only their places are checked.
   if (type == image::record_unit) {
-    if (length != image::unit_bytes || body != bytes + image::header_bytes + image::record_head_bytes)
-      return Refusal::bad_length;
-    cursor.unit = static_cast<std::size_t>(body - bytes);
-    return Refusal::none;
+    return body == bytes + image::header_bytes + image::record_head_bytes && length == image::unit_bytes
+               ? Refusal::none
+               : Refusal::bad_length;
   }
-  if (type == image::record_signature) {
-    if (length != image::signature_bytes || !at_end(cursor, size)) return Refusal::bad_length;
-    cursor.signature = static_cast<std::size_t>(body - bytes);
-    return Refusal::none;
-  }
+  if (type == image::record_signature)
+    return at_end(cursor, size) && length == image::signature_bytes ? Refusal::none : Refusal::bad_length;
   return (type & image::optional_record) == 0 ? Refusal::unknown_record : Refusal::none;
-}
-
-/// Whether an image whose records were read is for this unit: it is where it names none.
-inline Refusal check_unit(const std::uint8_t* bytes, const ImageCursor& cursor,
-                          const Sha256Digest& unit_hash) {
-  if (cursor.unit == 0) return Refusal::none;
-  unsigned other = is_given(unit_hash) ? 0U : 1U;
-  for (std::size_t k = 0; k < image::unit_bytes; ++k) {
-    other |= static_cast<unsigned>(bytes[cursor.unit + k] ^ unit_hash[k]);
-  }
-  return other == 0 ? Refusal::none : Refusal::wrong_unit;
 }
 
 /// Whether the records that were read are as many as the header says.

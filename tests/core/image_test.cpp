@@ -359,9 +359,11 @@ TEST(Image, RecordsAreChecked) {
     fix_crc(c);
     return load(c);
   };
-  EXPECT_EQ(altered(96, 3), Refusal::unknown_record);
+  EXPECT_EQ(altered(96, 3), Refusal::bad_length) << "28 bytes are no unit";
+  EXPECT_EQ(altered(96, 4), Refusal::bad_length) << "28 bytes are no signature";
+  EXPECT_EQ(altered(96, 5), Refusal::unknown_record);
   EXPECT_EQ(altered(96, 0), Refusal::unknown_record);
-  EXPECT_EQ(altered(96, 0x8003), Refusal::bad_length) << "skipped, but the header announced a term";
+  EXPECT_EQ(altered(96, 0x8005), Refusal::bad_length) << "skipped, but the header announced a term";
   EXPECT_EQ(altered(96, 2), Refusal::bad_length) << "28 bytes are no table";
   EXPECT_EQ(altered(98, 24), Refusal::bad_length);
   EXPECT_EQ(altered(98, 27), Refusal::bad_length);

@@ -67,7 +67,8 @@ inline Bytes image_of(const Robot& robot, std::uint32_t sequence, const TermList
   header.sequence = sequence;
   header.nominal_hash = nominal_hash(robot);
   header.name_hash = robot.name_hash;
-  Bytes out(image_size(list));
+  header.unit_hash = robot.unit_hash;
+  Bytes out(image_size(list, is_given(robot.unit_hash)));
   encode_image(list, header, out.data(), out.size());
   return out;
 }
@@ -167,13 +168,26 @@ inline double distance(const Joints& a, const Joints& b) {
   return greatest;
 }
 
+/// A command as a client gives it: what destroys sets after an unlock, which is no command of its own here.
+inline wire::Answer run_unlocked(Store& store, wire::Command command, std::uint32_t argument = 0,
+                                 Origin origin = 1) {
+  if (command == wire::Command::rollback || command == wire::Command::restore_defaults) {
+    wire::Status status;
+    store.run(wire::Command::unlock, 0, origin);
+    store.status(status);
+    store.run(wire::Command::unlock, status.detail, origin);
+  }
+  return store.run(command, argument, origin);
+}
+
 /// An arm on a flash, with the control cycle at hand.
 class Arm {
   std::unique_ptr<Flash> own_;
 
  public:
-  explicit Arm(Flash& memory, DeviceSettings settings = {}, Robot r = tx60l())
+  explicit Arm(Flash& memory, DeviceSettings settings = {}, Robot r = tx60l(), const Trust& trust = {})
       : flash(memory), robot(r), device(std::make_unique<Device>(r, memory.hooks(), settings)) {
+    device->set_trust(trust);
     device->store().boot();
     step();
   }
@@ -210,7 +224,7 @@ class Arm {
   }
 
   wire::Answer run(wire::Command c, std::uint32_t argument = 0, Origin origin = 1) {
-    return device->store().run(c, argument, origin);
+    return run_unlocked(device->store(), c, argument, origin);
   }
 
   wire::Answer stage(const Bytes& image, Origin origin = 1) {

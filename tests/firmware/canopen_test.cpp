@@ -113,6 +113,12 @@ class Canopen : public testing::Test {
     return expedited(co::command, 2, static_cast<std::uint32_t>(c), 2);
   }
 
+  /// What a client does before it rolls back or restores.
+  void unlock() {
+    EXPECT_EQ(command(Command::unlock), 0U);
+    EXPECT_EQ(command(Command::unlock, status().detail), 0U);
+  }
+
   wire::Status status() {
     wire::Status s;
     wire::decode(upload(co::status, 0).data(), wire::ByteOrder::little, s);
@@ -209,7 +215,9 @@ TEST_F(Canopen, AbortCodes) {
   EXPECT_EQ(expedited(0x1011, 1, 0x11111111, 4), co::abort::not_stored);
   EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), co::abort::device_state) << "nothing staged";
   EXPECT_EQ(command(static_cast<Command>(99)), co::abort::value);
-  EXPECT_EQ(command(Command::rollback), co::abort::device_state);
+  EXPECT_EQ(command(Command::rollback), co::abort::local_control) << "not unlocked";
+  unlock();
+  EXPECT_EQ(command(Command::rollback), co::abort::device_state) << "nothing to go back to";
   EXPECT_EQ(code(ask(head(0xE0, 0, 0))), co::abort::command);
   EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
   EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
@@ -315,9 +323,13 @@ TEST_F(Canopen, PushPullAndProbe) {
   ASSERT_EQ(arm.push(make_image(arm.robot, 6, 1, 6)), Answer::accepted);
   EXPECT_EQ(code(ask(Frame{0x70})), co::abort::device_state);
 
+  unlock();
   EXPECT_EQ(command(Command::rollback), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
   EXPECT_EQ(number(co::status_summary, 5), 5U);
+  EXPECT_EQ(expedited(0x1011, 1, co::load_signature, 4), co::abort::local_control)
+      << "one frame destroys nothing";
+  unlock();
   EXPECT_EQ(expedited(0x1011, 1, co::load_signature, 4), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
   EXPECT_EQ(number(co::status_summary, 5), 0U);

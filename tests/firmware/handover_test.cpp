@@ -83,8 +83,8 @@ TEST(Handover, EveryCycleUsesOneWholeSet) {
         if (store.run(trial ? Command::commit_trial : Command::commit, 20, 1) == Answer::accepted) ++pushed;
       }
       if (random() % 3 == 0) store.run(Command::confirm, 0, 1);
-      if (random() % 7 == 0) store.run(Command::rollback, 0, 1);
-    } else if (store.run(Command::restore_defaults, 0, 1) == Answer::accepted) {
+      if (random() % 7 == 0) run_unlocked(store, Command::rollback);
+    } else if (run_unlocked(store, Command::restore_defaults) == Answer::accepted) {
       ++rounds;
     }
     if (k % 8 == 0) std::this_thread::yield();

@@ -241,7 +241,7 @@ class Session {
     return static_cast<Answer>(device->status().answer);
   }
   Answer run(Command c) {
-    const Answer a = device->store().run(c, 0, 1);
+    const Answer a = run_unlocked(device->store(), c);
     if (a != Answer::accepted) return a;
     settle();
     return static_cast<Answer>(device->status().answer);

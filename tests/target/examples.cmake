@@ -27,3 +27,8 @@ flexcomp_example(minimal_controller minimal_controller.c LIBRARIES flexcomp_firm
 flexcomp_example(two_arms two_arms.c LIBRARIES flexcomp_firmware)
 flexcomp_example(servo_loop servo_loop.c LIBRARIES flexcomp_firmware)
 flexcomp_example(core_only core_only.cpp LIBRARIES flexcomp_core)
+# Its function that checks a signature is OpenSSL's, which no target here has.
+if(NOT CMAKE_CROSSCOMPILING)
+  find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+  flexcomp_example(signed_sets signed_sets.c LIBRARIES flexcomp_firmware OpenSSL::Crypto)
+endif()

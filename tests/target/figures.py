@@ -29,8 +29,10 @@ import write_tables
 # through a function of flexcomp_c.cpp that unpacks the caller's. `[]`: the caller's own function, whose stack comes on
 # top of every figure here.
 HOOKS = [
-    (r"_ZN8flexcomp8firmware5Store\w*", [r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write)E\w*"]),
-    (r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write)E\w*", []),
+    (r"_ZNK?8flexcomp8firmware5(Store|Slots)\w*",
+     [r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write)E\w*", r"_ZN8flexcomp8firmware5Store15check_signatureE\w*"]),
+    (r"_ZN8flexcomp8firmware14SignatureCheck\w*", [r"_ZN12_GLOBAL__N_13Arm5checkE\w*"]),
+    (r"_ZN12_GLOBAL__N_13Arm(4read|5erase|5write|5check)E\w*", []),
     (r"_ZN8flexcomp8firmware6Device(4boot|4poll|3run|13begin_unknown)E[\w.]*",
      [r"_ZN8flexcomp8firmware6Device7observeE[\w.]*", r"_ZN12_GLOBAL__N_13Arm(6permit|3log)E\w*"]),
     (r"_ZN8flexcomp8firmware6Device(7observe|12is_permitted)E[\w.]*", [r"_ZN12_GLOBAL__N_13Arm(6permit|3log)E\w*"]),

@@ -11,6 +11,7 @@
 #include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 #include "flexcomp_firmware/config.hpp"
 #include "flexcomp_firmware/control.hpp"
 #include "flexcomp_firmware/store.hpp"
@@ -25,6 +26,8 @@ struct DeviceSettings {
   /// The robot's name (UTF-8), told to clients; copied. The set's binding is by its hash in the robot. May be
   /// null.
   const char* name = nullptr;
+  /// The unit's serial number (UTF-8), told to clients; copied. The binding is by its hash in the robot. May be null.
+  const char* serial = nullptr;
 };
 
 /// What the hook `log` is told.
@@ -39,14 +42,22 @@ enum class Event : std::uint8_t {
   rolled_back = 7,      ///< detail: sequence of the set that is active then, 0: none
   restored = 8,         ///< both slots are erased; detail: 0
   storage_failed = 9,   ///< detail: the last command that was accepted (wire::Command), 0 at the start
-  not_authorised = 10,  ///< `permit` refused; detail: wire::Command
+  not_authorised = 10,  ///< `permit` refused, or no unlock or signature; detail: wire::Command
+  unlocked = 11,        ///< a client may roll back or restore now; detail: wire::Command::unlock
+};
+
+/// Answer of the hook `permit`.
+enum class Permit : std::uint8_t {
+  refuse = 0,    ///< the command is answered `not_authorised`
+  allow = 1,     ///< nothing speaks against it
+  authorise = 2  ///< the same; and where it would need an unlock or a signature, this takes their place
 };
 
 /// What a device asks and tells, in the background. None of them may call back.
 struct DeviceHooks {
   void* user = nullptr;  ///< given to both
-  /// False: the command is answered `not_authorised`. Null: all are allowed.
-  bool (*permit)(void* user, wire::Command command, Origin origin) = nullptr;
+  /// Asked for each command of a client. Null: all are allowed.
+  Permit (*permit)(void* user, wire::Command command, Origin origin) = nullptr;
   /// Told what has happened, from within the call in which it did.
   void (*log)(void* user, Event event, std::uint32_t detail) = nullptr;
 };
@@ -103,6 +114,11 @@ class Device {
   /// Status record.
   wire::Status status() const;
 
+  /// Store::set_trust(): before boot().
+  void set_trust(const Trust& trust) { store_.set_trust(trust); }
+  /// Unit record.
+  wire::UnitRecord unit() const;
+
   /// Certificate record of the active set.
   wire::CertificateRecord certificate() const;
   /// Value of 0x2005 (canopen_objects.hpp), sub-index 1 … 9, a real as binary32 bits; 0 without a set.
@@ -127,13 +143,15 @@ class Device {
     std::uint32_t sequence = 0, crc = 0;
     wire::Command command = wire::Command::none;  ///< the last one that was accepted
   };
-  bool is_permitted(wire::Command command, Origin origin);
+  bool is_permitted(wire::Command command, Origin origin, bool& is_authorised);
   static void observe(Device& device);
 
   const Robot robot_;
   const DeviceSettings settings_;
   std::array<char, wire::robot_name_bytes> name_{};
   std::size_t name_size_ = 0;
+  std::array<std::uint8_t, wire::serial_bytes> serial_{};
+  std::uint16_t serial_size_ = 0;
   ParameterSets sets_{};
   ControlCycle cycle_;
   Store store_;

@@ -3,33 +3,6 @@
 /// The parameter store: stages a parameter image, verifies it, writes it to non-volatile memory, activates
 /// it, and loads it at the next start. One state machine for every bus.
 ///
-/// Non-volatile memory has two slots. A slot holds the image from its first byte and, from its end backwards, up to five
-/// equal seals of 32 bytes, before these an announcement and up to 14 marks:
-///
-///      seal                                    mark, announcement
-///      0  "FLXS"                               0  "FLXM", "FLXB"
-///      4  u32 bytes of the image               4  u32 generation
-///      8  u32 sequence                         8  20 bytes 0
-///     12  u32 CRC-32 of the image             28  u32 CRC-32 of the 28 bytes before
-///     16  u32 generation
-///     20  8 bytes 0
-///     28  u32 CRC-32 of the 28 bytes before
-///
-/// Every commit has a generation of its own, one above all before; of two sets the higher one is in use. A mark voids the
-/// other slot's set up to its generation. A write or erase that the power cuts may read well at one start and badly at the next,
-/// and where it reads as erased nothing shows that it was begun. Therefore
-///
-/// - a commit erases the slot that is not in use, announces its generation there, writes the image, reads it back, and seals it
-///   three times. The first seal decides, and the announcement before it is there to be seen;
-/// - a start that finds fewer seals than three adds two before it trusts the set; a start that finds an announcement
-///   without a seal, or a seal that it does not trust, voids it by three marks in the other slot before anything is in use.
-///   No later start decides otherwise: two of either are whole;
-/// - one mark voids no set with two seals, so that a slot in use is erased only after three;
-/// - of two slots the one that marks void is erased before the one with the marks;
-/// - the set in use is read again before the other one is erased.
-///
-/// A set on trial has no seal until it is confirmed. Rollback commits the other set anew, then erases the slot that it leaves.
-///
 /// Everything here runs in the background, in one thread; only the handover word and the models that the
 /// cycle does not use are shared with the control cycle.
 #ifndef FLEXCOMP_FIRMWARE_STORE_HPP
@@ -44,32 +17,11 @@
 #include "flexcomp/wire/store_state.hpp"
 #include "flexcomp_firmware/config.hpp"
 #include "flexcomp_firmware/control.hpp"
+#include "flexcomp_firmware/signature_check.hpp"
+#include "flexcomp_firmware/slots.hpp"
 
 namespace flexcomp {
 namespace firmware {
-
-/// Result of a storage hook.
-enum class StorageResult : std::int8_t {
-  failed = -1,  ///< reported as a fault
-  done = 0,     ///< complete
-  busy = 1,     ///< erase and write only: not complete, the same call comes again
-};
-
-/// Non-volatile memory as the store needs it: two slots (0 and 1) of slot_bytes each. The hooks are called
-/// from the background only. Where a hook is null nothing is stored and commits are refused.
-struct Storage {
-  void* user = nullptr;  ///< given to every hook
-  /// Reads `size` bytes from `offset` of a slot; an unwritten slot may read as anything.
-  StorageResult (*read)(void* user, unsigned slot, std::uint32_t offset, std::uint8_t* to,
-                        std::uint32_t size) = nullptr;
-  /// Makes a whole slot writable. When power goes meanwhile, any of its bytes may be old or erased.
-  StorageResult (*erase)(void* user, unsigned slot) = nullptr;
-  /// Writes `size` bytes (a multiple of 32, at most 256) at `offset` (a multiple of 32) of an erased slot;
-  /// each byte is written once between two erases, save one whose writing the power has cut and that reads as erased: then
-  /// anything may become of it. Done means that the bytes survive a power loss.
-  StorageResult (*write)(void* user, unsigned slot, std::uint32_t offset, const std::uint8_t* from,
-                         std::uint32_t size) = nullptr;
-};
 
 /// Settings of the store.
 struct StoreSettings {
@@ -105,8 +57,12 @@ class Store {
   /// poll() checks in slices.
   void boot();
 
-  /// Runs one command of the wire; its answer is also in status().
-  wire::Answer run(wire::Command command, std::uint32_t argument, Origin origin);
+  /// From now on only sets that are signed with one of these keys, and bound to this unit, are used. Before boot().
+  void set_trust(const Trust& trust);
+
+  /// Runs one command of the wire; its answer is also in status(). `is_authorised`: also rollback and restore_defaults, for which
+  /// a client other than `nobody` needs an unlock or a signed command.
+  wire::Answer run(wire::Command command, std::uint32_t argument, Origin origin, bool is_authorised = false);
 
   /// begin() for a transfer whose length is not known yet: end() follows.
   wire::Answer begin_unknown(Origin origin);
@@ -143,20 +99,12 @@ class Store {
   std::uint16_t faults() const { return faults_; }                    ///< bits of wire::fault
   std::uint32_t announced_bytes() const { return announced_; }        ///< of the staged image
   Refusal refusal() const { return refusal_; }                        ///< of the last command
+  std::uint64_t counter() const { return slots_.counter(); }          ///< highest of an accepted signature
+  const Trust& trust() const { return trust_; }                       ///< as set
   const StoreSettings& settings() const { return settings_; }         ///< as given
   const Sha256Digest& nominal_hash() const { return nominal_hash_; }  ///< of the robot
 
  private:
-  /// A set that is, or was, active.
-  struct Set {
-    std::uint32_t index = Handover::none;
-    std::uint16_t slot = wire::no_slot;
-    std::uint32_t sequence = 0;
-    std::uint32_t bytes = 0;
-    std::uint32_t crc = 0;
-    std::uint32_t generation = 0;
-    std::uint8_t seals = 0;  ///< that can be read
-  };
   enum class Job : std::uint8_t {
     none,
     load,           ///< rollback: read the set in the other slot
@@ -185,6 +133,10 @@ class Store {
   wire::Answer rollback();
   wire::Answer restore();
   wire::Answer drop(Origin origin);
+  wire::Answer unlock(std::uint32_t argument, Origin origin);
+  bool has_permission(wire::Command command, Origin origin) const;
+  wire::Answer execute(wire::Command command, std::uint32_t argument, Origin origin);
+  bool must_wait(Origin origin);
   bool owns(Origin origin) const { return origin == owner_; }
   void release();
   bool free_model(std::uint32_t& index) const;
@@ -192,6 +144,7 @@ class Store {
   enum class Check : std::uint8_t {
     header,
     checksum,
+    signature,
     records,
     chain,
     derivatives,
@@ -201,40 +154,35 @@ class Store {
     verdict
   };
   /// What a check is for.
-  enum class Purpose : std::uint8_t { verify, commit, rollback };
+  enum class Purpose : std::uint8_t { start, verify, commit, rollback };
   void begin_check(std::uint32_t size, std::uint32_t index);
   bool check_slice(Refusal& r, std::uint32_t& detail);
+  /// Begins the check of a signature, or goes on with it; true where it has ended. Null without set_trust(): what it needs is
+  /// then not linked.
+  bool (*check_signature_)(Store& store, bool begins, Refusal& r) = nullptr;
+  static bool check_signature(Store& store, bool begins, Refusal& r);
+  Refusal begin_signature();
   void checked(Refusal r, std::uint32_t detail);
   void begin_commit();
   std::uint32_t used_model() const;
   bool plausible(const FirmwareModel& model, std::uint32_t pose, std::uint32_t& detail) const;
-  bool read_unit(unsigned slot, std::uint32_t offset, std::uint8_t* unit);
-  StorageResult write_unit(unsigned slot, std::uint32_t offset, const std::uint8_t* unit);
-  bool read_seals(unsigned slot, Set& set);
-  StorageResult add_seal(Set& set);
-  void read_marks(unsigned slot);
-  unsigned marks_against(const Set& set) const;
-  StorageResult add_mark(unsigned slot);
-  std::uint32_t begun(unsigned slot);
-  std::uint16_t target_slot();
-  bool is_counted(const Set& set) const;
-  void settle_start(const std::array<Set, 2>& found);
+  void settle_start(const std::array<StoredSet, 2>& found);
   void erase_at_start(unsigned slot);
-  bool add_at_start(Set* set, unsigned slot);
-  bool load(const Set& set);
-  bool is_in_staging(const Set& set) const;
+  bool add_at_start(StoredSet* set, unsigned slot);
+  bool load(const StoredSet& set);
+  bool is_in_staging(const StoredSet& set) const;
   /// A check that no commit waits for; its client may give it up.
   bool is_verifying() const { return job_ == Job::check && purpose_ == Purpose::verify; }
   void fail();
   void finish(wire::Answer a);
-  void make_active(const Set& set);
+  void make_active(const StoredSet& set);
   void watch_trial();
   void work();
 
   const Robot robot_;
   const Sha256Digest nominal_hash_;
   ParameterSets& sets_;
-  const Storage storage_;
+  Slots slots_;
   const StoreSettings settings_;
 
   wire::StoreState state_ = wire::StoreState::idle;
@@ -249,29 +197,42 @@ class Store {
   std::uint32_t announced_ = 0;
   std::uint32_t staged_ = 0;
 
-  Set active_{};
-  Set previous_{};  ///< what the other slot holds, or what a trial falls back to
-  Set incoming_{};  ///< what is verified, written or on trial
-  /// Marks of a slot: those that are there, and the next place.
-  struct Marks {
-    std::array<std::uint32_t, 14> generation{};  ///< 0: none
-    std::uint8_t next = 0;
-  };
-  std::array<Marks, 2> marks_{};
-  std::uint32_t generation_ = 0;  ///< highest that a seal or a mark has had
+  StoredSet active_{};
+  StoredSet previous_{};  ///< what the other slot holds, or what a trial falls back to
+  StoredSet incoming_{};  ///< what is verified, written or on trial
   Job job_ = Job::none;
   Check check_ = Check::header;
   Purpose purpose_ = Purpose::verify;
   std::uint32_t check_index_ = 0;  ///< of the model that the image is prepared in
   std::uint32_t check_bytes_ = 0;
-  std::uint32_t check_crc_ = 0;  ///< of the bytes so far
-  ImageHeader header_{};         ///< of the image that is checked
+  std::uint32_t check_crc_ = 0;      ///< of the bytes so far
+  ImageHeader header_{};             ///< of the image that is checked
+  std::uint64_t check_counter_ = 0;  ///< of its signature
+  bool is_command_ = false;          ///< it is no image but a signed command
   ImageCursor cursor_{};
   Admission<Scalar, joints> admission_{};
   std::uint32_t progress_ = 0;
   bool job_trial_ = false;
   bool job_rollback_ = false;
   std::uint32_t job_trial_cycles_ = 0;
+
+  Trust trust_{};
+  SignatureCheck signature_{};
+  /// Who may roll back or restore once.
+  struct Permission {
+    Origin origin = nobody;
+    wire::Command command = wire::Command::none;  ///< the one that was signed; none: either
+    std::uint32_t challenge = 0;                  ///< number that an unlock has to repeat; 0: given
+    std::uint32_t since_ms = 0;
+  };
+  Permission permission_{};
+  std::uint32_t challenges_ = 0;  ///< so far
+
+  std::uint32_t now_ms_ = 0;    ///< of the last poll
+  std::uint32_t began_ms_ = 0;  ///< the owner's first begin
+  Origin last_owner_ = nobody;  ///< who staged last
+  Origin waiting_ = nobody;     ///< who was told to wait for him
+  std::uint32_t waiting_ms_ = 0;
 
   alignas(8) std::array<std::uint8_t, staging_bytes> staging_{};
 };

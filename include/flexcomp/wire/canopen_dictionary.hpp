@@ -12,6 +12,7 @@
 #include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/robot_record.hpp"
 #include "flexcomp/wire/store_state.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 
 namespace flexcomp {
 namespace wire {
@@ -74,7 +75,7 @@ constexpr Object objects[] = {
     {identity, 1, Type::u32, Access::ro, 4, "Vendor-ID"},
     {identity, 2, Type::u32, Access::ro, 4, "Product code"},
     {identity, 3, Type::u32, Access::ro, 4, "Revision number"},
-    {identity, 4, Type::u32, Access::ro, 4, "Serial number: first bytes of the hash of the name"},
+    {identity, 4, Type::u32, Access::ro, 4, "Serial number: first bytes of its hash"},
     {sdo_server, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {sdo_server, 1, Type::u32, Access::ro, 4, "COB-ID client to server"},
     {sdo_server, 2, Type::u32, Access::ro, 4, "COB-ID server to client"},
@@ -100,6 +101,7 @@ constexpr Object objects[] = {
     {certificate_summary, 7, Type::real32, Access::ro, 4, "Deflection of joint 4, at most, deg"},
     {certificate_summary, 8, Type::real32, Access::ro, 4, "Deflection of joint 5, at most, deg"},
     {certificate_summary, 9, Type::real32, Access::ro, 4, "Deflection of joint 6, at most, deg"},
+    {unit, 0, Type::domain, Access::ro, unit_record_bytes, "Unit record"},
     {image, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {image, image_staging, Type::domain, Access::wo, 0, "Parameter image into staging"},
     {image, image_active, Type::domain, Access::ro, 0, "Active parameter image"},

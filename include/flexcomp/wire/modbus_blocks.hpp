@@ -11,6 +11,7 @@
 #include "flexcomp/wire/certificate_record.hpp"
 #include "flexcomp/wire/modbus_map.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 
 namespace flexcomp {
 namespace wire {
@@ -32,6 +33,7 @@ enum class Block : std::uint8_t {
   corrections,     ///< of the last control cycle, binary32
   robot,           ///< robot record
   certificate,     ///< certificate record
+  unit,            ///< unit record
 };
 
 /// One block of the map.
@@ -72,6 +74,7 @@ constexpr BlockDescription block_descriptions[] = {
     {Block::robot, robot, robot_registers, true, false, "robot", "the nominal robot"},
     {Block::certificate, certificate, certificate_registers, true, false, "certificate",
      "what the active set can do at most, and what a step costs"},
+    {Block::unit, unit, unit_registers, true, false, "unit", "which unit this is, and whom it trusts"},
 };
 /// Number of blocks.
 constexpr std::size_t block_count = sizeof block_descriptions / sizeof block_descriptions[0];

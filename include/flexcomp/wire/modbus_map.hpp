@@ -20,6 +20,7 @@
 ///                                 last control cycle, then the largest of any joint since the start (deg)
 ///     0x0500       288    r       robot record (robot_record.hpp)
 ///     0x0700        92    r       certificate record of the active set (certificate_record.hpp)
+///     0x0800        64    r       unit record (unit_record.hpp)
 ///
 /// - All of it is read by function 03 and by 04 alike, written by 06, 16 and 23. What lies between the blocks
 ///   does not exist (exception 02), a write to what is only read is exception 02 as well.

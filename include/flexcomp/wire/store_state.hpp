@@ -116,6 +116,11 @@ enum class Answer : std::uint16_t {
   reverted = 10,        ///< the trial ran out before it was confirmed
 };
 
+/// Detail of Answer::not_authorised: the command was not unlocked.
+constexpr std::uint32_t needs_unlock = 1;
+/// Detail of Answer::not_authorised: the command was not signed, and the controller trusts a key.
+constexpr std::uint32_t needs_signature = 2;
+
 /// Bits of the status field `faults`. None of them stops the robot.
 namespace fault {
 constexpr std::uint16_t no_valid_set = 1;  ///< no slot held a set that this controller accepts: pass-through
