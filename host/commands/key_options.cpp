@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <vector>
 
@@ -25,9 +26,19 @@ std::vector<std::string> ids_of(const ControllerUnit& unit) {
 
 void KeyOptions::add_to(CLI::App& app, const std::string& what) {
   CLI::Option* const of_key = app.add_option("--key", key, what)->type_name("KEY");
-  app.add_option(
-         "--counter", counter,
+  // CLI11 itself takes -1 and what is beyond 64 bits for the greatest number.
+  app.add_option_function<std::string>(
+         "--counter",
+         [this](const std::string& text) {
+           std::uint64_t value = 0;
+           const char* const end = text.data() + text.size();
+           const auto [at, error] = std::from_chars(text.data(), end, value);
+           if (error != std::errc() || at != end)
+             throw CLI::ValidationError("--counter", fmt::format("'{}' is no whole number of 64 bits", text));
+           counter = value;
+         },
          "Counter of the signature; by default the Unix time in ms, or one more than the controller's")
+      ->type_name("NUMBER")
       ->needs(of_key);
 }
 

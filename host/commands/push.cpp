@@ -115,17 +115,22 @@ Bytes Push::authorised(ControllerClient& client, const MadeSet& made, const Sign
 std::optional<wire::Status> Push::found_active(ControllerClient& client, const Bytes& bytes) const {
   if (auto now = read_back(client, bytes)) return now;
   // A signature has a counter, which no other has: what is signed again is another image of the same set.
-  if (client.status().active_slot == wire::no_slot) return std::nullopt;
-  const Bytes active = client.active_image();
+  const wire::Status there = client.status();
+  if (there.active_slot == wire::no_slot || there.active_sequence != identity(bytes).sequence)
+    return std::nullopt;
+  Bytes active;
+  try {
+    active = client.active_image();
+  } catch (const BusError& e) {
+    throw OutcomeOpen(client.where(), fmt::format("the active set could not be read: {}", e.text()));
+  }
   try {
     if (without_signature(active, client.where()) != without_signature(bytes, set)) return std::nullopt;
   } catch (const InputError&) {
     return std::nullopt;
   }
   auto now = read_back(client, active);
-  if (now) {
-    bus.say(fmt::format("{}: the active set has another signature; without it, it is equal", client.where()));
-  }
+  if (now) bus.say(fmt::format("{}: equal but for its signature, which is not compared", client.where()));
   return now;
 }
 
@@ -167,7 +172,7 @@ void Push::send(OutcomeTask& task, const std::optional<Bytes>& ready, const Sign
     if (before.active_slot != wire::no_slot) {
       const Bytes bytes = make(client, ready, before.active_sequence).bytes;
       if (const auto now = found_active(client, bytes)) {
-        say_active(task, *now, bytes.size(), false, seconds());
+        say_active(task, *now, now->active_bytes, false, seconds());
         return;
       }
     }

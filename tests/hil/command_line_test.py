@@ -149,7 +149,7 @@ try:
     # --- the examples
     commands = re.search(r"Subcommands:\n(.*)", done("flexcomp --help"), re.S).group(1)
     commands = re.findall(r"^  ([a-z]+) ", commands, re.M)
-    if len(commands) < 17: fail("commands", commands)
+    if len(commands) < 20: fail("commands", commands)
     for status in "012345":
         if not re.search(r"Exit status:.*\b%s " % status, done("flexcomp --help"), re.S): fail("--help does not tell status", status)
     for command in ("simulate", "compensate"):
@@ -167,7 +167,7 @@ try:
             # The controller of this test for the ones of the examples.
             line = re.sub(r"(can|modbus-tcp|modbus-rtu):\S+", bus, line)
             start = time.time()
-            if command == "rollback": done("flexcomp push --to %s cal2.yaml --quiet" % bus)
+            if command in ("rollback", "erase"): done("flexcomp push --to %s cal2.yaml --quiet" % bus)
             code, said, warned = run(line)
             examples += 1
             print("%5.1f s" % (time.time() - start), line)
@@ -189,7 +189,7 @@ asked = {"flexcomp|ident": "identify", "flexcomp|pu": "push pull", "flexcomp|ide
          "flexcomp|identify|--model|": "full geometric no-gravity no-stiffness", "flexcomp|identify|--model|no-s": "no-stiffness",
          "flexcomp|identify|--robot|tx": "tx60l.yaml", "flexcomp|identify|--robot|rob": "robots", "flexcomp|identify|--data|zz": "zz file.csv",
          "flexcomp|study|fig": "fig2 fig3 fig4 fig8", "flexcomp|export|--as|": "c urdf eds modbus", "flexcomp|export|--urdf|kr": "kr6.urdf",
-         "flexcomp|push|--dr": "--dry-run", "flexcomp|import|--delimiter|": "blanks comma semicolon tab", "flexcomp|import|--decimal|": "comma point",
+         "flexcomp|push|--dr": "--dry-run", "flexcomp|push|--key|arm": "arm.key arm.key.pub", "flexcomp|trust|ar": "arm.key.pub", "flexcomp|keyg": "keygen", "flexcomp|import|--delimiter|": "blanks comma semicolon tab", "flexcomp|import|--decimal|": "comma point",
          "flexcomp|identify|--model|=|no-s": "no-stiffness", "flexcomp|identify|--model|=": "full geometric no-gravity no-stiffness",
          "flexcomp|identify|--model=no-": "--model=no-gravity --model=no-stiffness", "flexcomp|identify|--robot=tx": "--robot=tx60l.yaml",
          "flexcomp|identify|--robot|=|tx": "tx60l.yaml", "flexcomp|completion|": "bash", "flexcomp|simulate|--poses|1": "", "flexcomp|nothing|-": ""}

@@ -173,7 +173,8 @@ TEST(SigningKeys, ThatAreCutOrDamagedAreRefused) {
   for (std::size_t size = 0; size + 1 < whole_public.size(); ++size)
     EXPECT_THROW(read_public_key(support::write("cut.pub", whole_public.substr(0, size))), InputError)
         << size;
-  // An altered character of the 32 bytes of the key, after the 12 that say what they are, makes another key
+  // An altered character of the 32 bytes of the key, after the 12 that say what they are, makes
+  // another key, or none; never this one.
   for (std::size_t k = 27 + 16; k < 85; ++k) {
     std::string altered = whole_public;
     altered[k] = altered[k] == 'A' ? 'B' : 'A';

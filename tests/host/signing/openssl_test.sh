@@ -21,11 +21,10 @@ expect 2 "another file" trust arm.key.pub -o ./arm.key.pub
 openssl genpkey -algorithm ED25519 -out theirs.key && openssl pkey -in theirs.key -pubout -out theirs.pub
 expect_all 0 "$id" "C array flexcomp_trusted_keys[2]" -- "$flexcomp" trust arm.key.pub theirs.pub -o keys.h
 cat >print.c <<'C'
-#include "keys.h"
 #include <stdio.h>
 int main(void) { return fwrite(flexcomp_trusted_keys, 32, 2, stdout) == 2 ? 0 : 1; }
 C
-cc -std=c99 -Wall -Wextra -Wpedantic -Werror print.c -o print && ./print >array.bin
+cc -std=c99 -Wall -Wextra -Wpedantic -Werror -include ./keys.h print.c -o print && ./print >array.bin
 for pub in arm.key.pub theirs.pub; do openssl pkey -pubin -in $pub -outform DER | tail -c 32; done | cmp - array.bin ||
   fail "the array has other bytes"
 openssl genrsa -out rsa.key 2048 2>rsa.txt
