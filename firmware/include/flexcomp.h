@@ -84,7 +84,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
 /** Memory of one arm: staging, two sets, and the rest. */
 #define FLEXCOMP_MEMORY_BYTES (4032 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
 /** Memory of one CANopen node. */
-#define FLEXCOMP_CAN_BYTES 1408
+#define FLEXCOMP_CAN_BYTES 1248
 /** Memory of one Modbus serial line. */
 #define FLEXCOMP_RTU_BYTES 768
 /** Memory of one Modbus TCP connection. */
@@ -560,7 +560,7 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
  * BACKGROUND; small and one frame sent, of a block upload eight, but for the frame that
  *   begins an image (clears FLEXCOMP_STAGING_BYTES),
  *   reads one (one `read` of up to 576 bytes),
- *   ends a probe (two steps),
+ *   reads the answer to a probe (two steps),
  *   verifies or commits (a check of the image),
  *   rolls back (one `read`, and a check). */
 void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, size_t size);

@@ -305,13 +305,10 @@ std::uint32_t CanopenNode::set(SdoServer& by, std::uint16_t index, std::uint8_t 
       }
       client.command = load_u16(bytes);
       return command(by, static_cast<wire::Command>(client.command), client.argument);
-    case co::probe: {
+    case co::probe:
       std::memcpy(client.probe_request.data(), bytes, size);
-      wire::ProbeRequest probe;
-      wire::decode(client.probe_request.data(), ByteOrder::little, probe);
-      wire::encode(device_.probe(probe), ByteOrder::little, client.probe_response.data());
+      client.is_asked = true;
       return co::abort::none;
-    }
     case co::sdo_channel: {
       SdoIdentifiers& now = servers_[1].identifiers();
       const std::uint32_t code = set_identifier(sub == 1 ? now.request : now.answer, load_u32(bytes), 0);
@@ -432,13 +429,18 @@ std::uint32_t CanopenNode::get(SdoServer& by, std::uint16_t index, std::uint8_t 
       number = sub == 0 ? 2U : sub == co::command_argument ? client.argument : client.command;
       break;
     case co::probe:
-      if (sub == co::probe_request)
-        std::memcpy(out, client.probe_request.data(), client.probe_request.size());
-      if (sub == co::probe_response)
-        std::memcpy(out, client.probe_response.data(), client.probe_response.size());
-      if (sub != 0) return co::abort::none;
       number = 2;
-      break;
+      if (sub == 0) break;
+      if (sub == co::probe_request) {
+        std::memcpy(out, client.probe_request.data(), size);
+      } else if (client.is_asked) {
+        wire::ProbeRequest request;
+        wire::decode(client.probe_request.data(), ByteOrder::little, request);
+        wire::encode(device_.probe(request), ByteOrder::little, out);
+      } else {
+        std::memset(out, 0, size);
+      }
+      return co::abort::none;
     case co::corrections:
       number = 7;
       if (sub != 0) {

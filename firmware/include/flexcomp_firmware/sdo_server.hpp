@@ -19,10 +19,10 @@ class CanopenNode;
 
 /// Objects 0x2011 and 0x2020, of which each server has its own: what one client writes is not run or read by another.
 struct ClientObjects {
-  std::uint32_t argument = 0;                                             ///< of the next command
-  std::uint16_t command = 0;                                              ///< the last one
-  std::array<std::uint8_t, wire::probe_request_bytes> probe_request{};    ///< record
-  std::array<std::uint8_t, wire::probe_response_bytes> probe_response{};  ///< record
+  std::uint32_t argument = 0;                                           ///< of the next command
+  std::uint16_t command = 0;                                            ///< the last one
+  std::array<std::uint8_t, wire::probe_request_bytes> probe_request{};  ///< record
+  bool is_asked = false;                                                ///< whether it has been written
 };
 
 /// COB-IDs of a server; bit 31 (wire::canopen::not_valid) in either: there is none.

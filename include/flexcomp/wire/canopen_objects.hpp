@@ -63,8 +63,8 @@
 ///              1  UNSIGNED32      rw      argument of the next command
 ///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads the last one
 ///     0x2020   0  UNSIGNED8       const   2
-///              1  DOMAIN          rw      probe request record; its download answers it
-///              2  DOMAIN          ro      probe response record
+///              1  DOMAIN          rw      probe request record
+///              2  DOMAIN          ro      probe response record, by the set that is active when it is read
 ///     0x2021   0  UNSIGNED8       const   7: corrections
 ///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
 ///              7  REAL32          ro      largest correction of any joint since the start, deg
