@@ -581,9 +581,12 @@ void flexcomp_can_set_memory(flexcomp_can* can, flexcomp_can_load load, flexcomp
 /** Opens the second SDO server (1201h) with these COB-IDs, now and after each reset by the network: a channel for flexcomp
  * beside a master that has 1200h. Nonzero: done; 0: there is none, as without this call, because they are equal,
  * restricted (CiA 301, 7.3.5) or in use by this node. flexcomp's choice for nodes 1 ... 48 is 67Fh + node and 6AFh + node,
- * which are no other node's of the pre-defined connection set. The driver's filter has to let `request_id` through.
- * BACKGROUND; small, no hook. */
+ * which are no other node's of the pre-defined connection set. BACKGROUND; small, no hook. */
 int flexcomp_can_set_channel(flexcomp_can* can, unsigned request_id, unsigned answer_id);
+/** COB-ID of requests to the second SDO server, which a master may set up or change by 1201h; 0: there is none. A driver
+ * that filters lets this through beside 0 and 600h + node, and asks again after flexcomp_can_receive. BACKGROUND;
+ * small, no hook. */
+unsigned flexcomp_can_channel(const flexcomp_can* can);
 /** Frames of an image that a client may send without an answer (SDO block download), 3 ... 63; 63 without this
  * call. Not more than your receive queue holds: what it loses is sent again, which takes time. 0: no block
  * transfers, which doubles the bus load of a push. BACKGROUND; small, no hook. */

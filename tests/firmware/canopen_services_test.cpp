@@ -147,12 +147,14 @@ TEST_F(CanopenServices, TheNetworkSetsItUpAsTheStandardHasIt) {
   EXPECT_EQ(write(plc, co::sdo_channel, 1, 0x085, 4), co::abort::value) << "EMCY has it";
   EXPECT_EQ(write(plc, co::sdo_channel, 1, own, 4), 0U);
   EXPECT_FALSE(ask(own, sdo(0x40, co::device_type, 0))) << "half a channel is none";
+  EXPECT_NE(node.channel_request() & co::not_valid, 0U);
   EXPECT_EQ(write(plc, co::sdo_channel, 2, own, 4), co::abort::value) << "one for both";
   EXPECT_EQ(write(plc, co::sdo_channel, 1, own + 1, 4), co::abort::value) << "changed while valid";
   EXPECT_EQ(write(plc, co::sdo_channel, 1, co::not_valid | (own + 1U), 4), co::abort::value);
   EXPECT_EQ(write(plc, co::sdo_channel, 2, co::channel_answer_id + node_id, 4), 0U);
   EXPECT_EQ(read(own, co::device_type, 0), 0U);
   EXPECT_EQ(read(own, co::sdo_channel, 1), own);
+  EXPECT_EQ(node.channel_request(), own);
   // Nor does another service take what the channel has.
   EXPECT_EQ(write(plc, co::emergency, 0, 0x80000085U, 4), 0U);
   EXPECT_EQ(write(plc, co::emergency, 0, own, 4), co::abort::value);

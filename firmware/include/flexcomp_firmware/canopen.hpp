@@ -71,6 +71,10 @@ class CanopenNode {
   /// network sets it up. False, and none, where they are equal, restricted (CiA 301, 7.3.5) or in use here.
   bool set_channel(std::uint32_t request_id, std::uint32_t answer_id);
 
+  /// COB-ID of requests to the second server, which the network may change; wire::canopen::not_valid: there is none. For
+  /// a driver that filters.
+  std::uint32_t channel_request() const { return servers_[1].request_id(); }
+
   /// NMT state.
   wire::canopen::NmtState state() const { return state_; }
 

@@ -50,9 +50,10 @@ class SdoServer {
   /// Ends the transfer without a word; argument and last command are forgotten.
   void reset(const SdoIdentifiers& identifiers);
   /// Whether a frame with this identifier is a request to this server.
-  bool takes(std::uint16_t id) const {
-    return ((identifiers_.request | identifiers_.answer) & wire::canopen::not_valid) == 0 &&
-           id == identifiers_.request;
+  bool takes(std::uint16_t id) const { return id == request_id(); }
+  /// COB-ID of requests; with bit 31 where there is no server.
+  std::uint32_t request_id() const {
+    return identifiers_.request | (identifiers_.answer & wire::canopen::not_valid);
   }
   /// Takes a request of 8 bytes; any are valid input.
   void request(const std::uint8_t* frame);
