@@ -367,7 +367,7 @@ bool SdoServer::read_segment(std::uint32_t offset, std::uint8_t* to, std::uint32
     node_.device_.robot_record_part(offset, to, size);
     return true;
   }
-  if (index_ != co::image) {
+  if (index_ != co::image || sub_ != co::image_active) {
     std::memcpy(to, scratch_.data() + offset, size);
     return true;
   }

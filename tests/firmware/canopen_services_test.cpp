@@ -331,6 +331,26 @@ TEST_F(CanopenServices, TheRobotRecordInPiecesIsTheRecord) {
   EXPECT_EQ(all, whole);
 }
 
+TEST_F(CanopenServices, EverySmallObjectComesInABlockAsWell) {
+  arm.push(make_image(arm.robot, 5));
+  for (const co::Object& o : co::objects) {
+    if (o.size == 0 || o.size > 4 || o.access == co::Access::wo) continue;
+    const auto plain = ask(plc, sdo(0x40, o.index, o.sub));
+    ASSERT_TRUE(plain);
+    const auto first = ask(plc, sdo(0xA4, o.index, o.sub, 63));
+    if (code(plain) != 0) {
+      EXPECT_EQ(code(first), code(plain));
+      continue;
+    }
+    ASSERT_EQ(load_u32(first->data() + 4), o.size) << std::hex << o.index << " " << int{o.sub};
+    const auto segment = ask(plc, SdoFrame{0xA3});
+    ASSERT_EQ((*segment)[0], 0x81) << std::hex << o.index << " " << int{o.sub};
+    EXPECT_TRUE(std::equal(segment->begin() + 1, segment->begin() + 1 + o.size, plain->begin() + 4));
+    ask(plc, SdoFrame{0xA2, 1, 63});
+    node.receive(plc, SdoFrame{0xA1}.data(), 8);
+  }
+}
+
 TEST_F(CanopenServices, NoPdoWithoutBeingAsked) {
   EXPECT_EQ(read(plc, co::pdo, 0), 5U);
   EXPECT_EQ(read(plc, co::pdo, 1), 0xC0000185U);
