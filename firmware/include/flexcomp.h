@@ -84,7 +84,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
 /** Memory of one arm: staging, two sets, and the rest. */
 #define FLEXCOMP_MEMORY_BYTES (4032 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
 /** Memory of one CANopen node. */
-#define FLEXCOMP_CAN_BYTES 1088
+#define FLEXCOMP_CAN_BYTES 1248
 /** Memory of one Modbus serial line. */
 #define FLEXCOMP_RTU_BYTES 768
 /** Memory of one Modbus TCP connection. */
@@ -593,13 +593,13 @@ flexcomp_can* flexcomp_can_init(void* memory, size_t size, flexcomp_arm* fc, uns
  * BACKGROUND; small and one frame sent, of a block upload eight, but for the frame that
  *   begins an image (clears FLEXCOMP_STAGING_BYTES),
  *   reads one (one `read` of up to 576 bytes),
- *   ends a probe (two steps),
+ *   reads the answer to a probe (two steps),
  *   verifies or commits (a check of the image),
  *   rolls back (one `read`, and a check). */
 void flexcomp_can_receive(flexcomp_can* can, uint16_t id, const uint8_t* bytes, size_t size);
-/** Background work of a node: boot-up, heartbeat, timeouts, frames that could not be sent. Every few
- * milliseconds. BACKGROUND; small, at most twelve frames sent (eight are segments of a block upload, which
- * pauses while the queue is full). */
+/** Background work of a node: boot-up, heartbeat, EMCY, TPDO, timeouts, frames that could not be sent. Every few
+ * milliseconds. BACKGROUND; small, at most 23 frames sent (eight for each of two SDO servers are segments of a block
+ * upload, which pauses while the queue is full). */
 void flexcomp_can_poll(flexcomp_can* can, uint32_t now_ms);
 /** Copies the 8 bytes that were saved at last to `bytes`; 0 where there are none. */
 typedef int (*flexcomp_can_load)(void* user, uint8_t* bytes);
@@ -611,6 +611,15 @@ typedef int (*flexcomp_can_save)(void* user, const uint8_t* bytes);
  * each reset by the network. Without it both are as built after each reset, and 1010h:2 is refused (0601 0000h).
  * BACKGROUND; calls `load`. */
 void flexcomp_can_set_memory(flexcomp_can* can, flexcomp_can_load load, flexcomp_can_save save, void* user);
+/** Opens the second SDO server (1201h) with these COB-IDs, now and after each reset by the network: a channel for flexcomp
+ * beside a master that has 1200h. Nonzero: done; 0: there is none, as without this call, because they are equal,
+ * restricted (CiA 301, 7.3.5) or in use by this node. flexcomp's choice for nodes 1 ... 48 is 67Fh + node and 6AFh + node,
+ * which are no other node's of the pre-defined connection set. BACKGROUND; small, no hook. */
+int flexcomp_can_set_channel(flexcomp_can* can, unsigned request_id, unsigned answer_id);
+/** COB-ID of requests to the second SDO server, which a master may set up or change by 1201h; 0: there is none. A driver
+ * that filters lets this through beside 0 and 600h + node, and asks again after flexcomp_can_receive. BACKGROUND;
+ * small, no hook. */
+unsigned flexcomp_can_channel(const flexcomp_can* can);
 /** Frames of an image that a client may send without an answer (SDO block download), 3 ... 63; 63 without this
  * call. Not more than your receive queue holds: what it loses is sent again, which takes time. 0: no block
  * transfers, which doubles the bus load of a push. BACKGROUND; small, no hook. */

@@ -620,6 +620,15 @@ void flexcomp_can_set_memory(flexcomp_can* can, flexcomp_can_load load, flexcomp
   can_of(can).node.set_memory({user, load, save});
 }
 
+int flexcomp_can_set_channel(flexcomp_can* can, unsigned request_id, unsigned answer_id) {
+  return can_of(can).node.set_channel(request_id, answer_id) ? 1 : 0;
+}
+
+unsigned flexcomp_can_channel(const flexcomp_can* can) {
+  const std::uint32_t id = reinterpret_cast<const Can*>(can)->node.channel_request();
+  return (id & flexcomp::wire::canopen::not_valid) == 0 ? id : 0U;
+}
+
 void flexcomp_can_set_block_size(flexcomp_can* can, unsigned frames) {
   can_of(can).node.set_block_size(static_cast<std::uint8_t>(frames < 63 ? frames : 63));
 }

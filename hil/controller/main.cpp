@@ -36,7 +36,11 @@ constexpr std::string_view usage =
     "\n"
     "  --robot R.yaml                             the arm, as the calibrator's robot file\n"
     "  --store FILE                               non-volatile memory; made where it does not exist\n"
-    "  --can IFACE[:NODE]                         serve CANopen on a SocketCAN interface\n"
+    "  --can IFACE[:NODE[:CHANNEL]]               serve CANopen on a SocketCAN interface; CHANNEL opens the "
+    "SDO server\n"
+    "                                             1201h: own (67Fh + NODE and 6AFh + NODE), or such as "
+    "684-6B4.\n"
+    "                                             1010h:2 saves heartbeat and inhibit time in FILE.can\n"
     "  --modbus-tcp HOST[:PORT][:UNIT]            serve Modbus TCP; PORT 0 takes a free one\n"
     "  --modbus-idle-s 60                         close TCP connections without a request for so long, s; 0: "
     "never\n"
@@ -45,7 +49,7 @@ constexpr std::string_view usage =
     "  --trust KEY.pub                            use sets only that are signed with this key; again: each "
     "counts\n"
     "  --trial-cycles 60000                       control cycles until an unconfirmed trial reverts\n"
-    "  --heartbeat-ms 1000                        CANopen heartbeat, ms; 0: none\n"
+    "  --heartbeat-ms 1000                        CANopen heartbeat, ms, where FILE.can has none; 0: none\n"
     "  --help                                     this text\n"
     "\n"
     "Prints one line `ready ...` when it serves, ends on SIGTERM or SIGINT.\n"
@@ -221,7 +225,8 @@ int serve(const Options& options) {
 
   std::vector<std::unique_ptr<hil::Port>> ports;
   if (options.can)
-    ports.push_back(std::make_unique<hil::CanPort>(*device, 1, *options.can, options.heartbeat_ms));
+    ports.push_back(std::make_unique<hil::CanPort>(*device, 1, *options.can, options.heartbeat_ms,
+                                                   options.store + ".can"));
   if (options.rtu) ports.push_back(std::make_unique<hil::RtuPort>(*device, 2, *options.rtu));
   if (options.tcp)
     ports.push_back(std::make_unique<hil::TcpPort>(*device, 3, *options.tcp, options.modbus_idle_s * 1000));

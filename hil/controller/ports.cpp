@@ -80,13 +80,8 @@ host::Descriptor open_can(const host::CanAddress& address) {
   if (!socket) fail("this kernel has no SocketCAN (" + reason() + "); see hil/with-vcan");
   const unsigned index = ::if_nametoindex(address.interface.c_str());
   if (index == 0) fail("no such interface");
-  // Only 11-bit data frames with the identifiers of this node.
-  const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-  const can_filter filters[2] = {
-      {wire::canopen::nmt_id, mask},
-      {static_cast<canid_t>(wire::canopen::sdo_request_id + address.node), mask},
-  };
-  if (::setsockopt(socket.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0) fail(reason());
+  // Nothing until follow_channel().
+  if (::setsockopt(socket.get(), SOL_CAN_RAW, CAN_RAW_FILTER, nullptr, 0) != 0) fail(reason());
   sockaddr_can bound{};
   bound.can_family = AF_CAN;
   bound.can_ifindex = static_cast<int>(index);
@@ -97,10 +92,33 @@ host::Descriptor open_can(const host::CanAddress& address) {
 }  // namespace
 
 CanPort::CanPort(firmware::Device& device, firmware::Origin origin, const host::CanAddress& address,
-                 std::uint16_t heartbeat_ms)
+                 std::uint16_t heartbeat_ms, const std::string& memory)
     : address_(address),
       socket_(open_can(address)),
-      node_(device, origin, {address.node, heartbeat_ms, 2000}, {this, send}) {}
+      memory_(memory),
+      node_(device, origin, {address.node, heartbeat_ms, 2000}, {this, send}) {
+  if (address.own_request != 0 && !node_.set_channel(address.own_request, address.own_answer))
+    throw host::BusError(text(), "the node itself uses one of these COB-IDs");
+  node_.set_memory(memory_.hooks());
+  follow_channel();
+}
+
+/// Only 11-bit data frames with the identifiers of this node; others stay in the kernel.
+void CanPort::follow_channel() {
+  const std::uint32_t channel = node_.channel_request();
+  if (channel == filtered_) return;
+  constexpr canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+  const std::array<can_filter, 3> filters{
+      {{wire::canopen::nmt_id, mask},
+       {static_cast<canid_t>(wire::canopen::sdo_request_id + address_.node), mask},
+       {channel & CAN_SFF_MASK, mask}}};
+  const std::size_t used = (channel & wire::canopen::not_valid) == 0 ? 3 : 2;
+  if (::setsockopt(socket_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
+                   static_cast<socklen_t>(used * sizeof filters[0])) != 0) {
+    throw host::BusError(text(), reason());
+  }
+  filtered_ = channel;
+}
 
 void CanPort::wait_on(std::vector<pollfd>& descriptors) const {
   // A socket whose interface is down reports an error permanently; serve() retries in each call.
@@ -125,6 +143,7 @@ void CanPort::serve() {
                   frame.can_dlc <= 8 ? frame.can_dlc : 8U);
   }
   node_.poll(now_ms());
+  follow_channel();
 }
 
 bool CanPort::send(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) {

@@ -15,6 +15,7 @@
 #include "bus/descriptor.hpp"
 #include "flexcomp_firmware/canopen.hpp"
 #include "flexcomp_firmware/modbus.hpp"
+#include "record_file.hpp"
 
 namespace flexcomp::hil {
 
@@ -34,18 +35,22 @@ class Port {
 /// A CANopen node on SocketCAN.
 class CanPort final : public Port {
  public:
-  /// \throws host::BusError  no such interface, or not allowed
+  /// Keeps communication parameters in the file `memory`; with a CHANNEL in the address the second SDO server is open.
+  /// \throws host::BusError  no such interface, not allowed, or a CHANNEL that this node cannot have
   CanPort(firmware::Device& device, firmware::Origin origin, const host::CanAddress& address,
-          std::uint16_t heartbeat_ms);
+          std::uint16_t heartbeat_ms, const std::string& memory);
   void wait_on(std::vector<pollfd>& descriptors) const override;
   void serve() override;
   std::string text() const override;
 
  private:
   static bool send(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size);
+  void follow_channel();
   host::CanAddress address_;
   host::Descriptor socket_;
+  RecordFile memory_;
   firmware::CanopenNode node_;
+  std::uint32_t filtered_ = 0;  ///< COB-ID of 1201h that the socket lets through
   bool down_ = false;
 };
 

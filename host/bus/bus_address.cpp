@@ -9,10 +9,14 @@
 #include <stdexcept>
 #include <vector>
 
+#include "flexcomp/wire/canopen_objects.hpp"
+
 namespace flexcomp::host {
 namespace {
 
-constexpr std::string_view can_form = "can:IFACE[:NODE]";
+namespace co = wire::canopen;
+
+constexpr std::string_view can_form = "can:IFACE[:NODE[:CHANNEL]]";
 constexpr std::string_view tcp_form = "modbus-tcp:HOST[:PORT][:UNIT]";
 constexpr std::string_view rtu_form = "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]";
 
@@ -56,9 +60,37 @@ std::vector<std::string_view> fields(std::string_view text) {
   }
 }
 
+/// Sets the COB-IDs of "own" or "684-6B4".
+void parse_channel(std::string_view text, CanAddress& out, const AddressError& fail) {
+  if (text == "own") {
+    if (out.node > co::most_channels) {
+      fail(fmt::format("'own' is for nodes up to {}; give REQUEST-ANSWER as the node has them in 1201h",
+                       co::most_channels));
+    }
+    out.own_request = static_cast<std::uint16_t>(co::channel_request_id + out.node);
+    out.own_answer = static_cast<std::uint16_t>(co::channel_answer_id + out.node);
+    return;
+  }
+  const auto identifier = [](std::string_view digits) -> std::uint16_t {
+    std::uint16_t id = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), id, 16);
+    const bool whole = error == std::errc() && end == digits.data() + digits.size();
+    return whole && !co::is_restricted(id) ? id : std::uint16_t{0};
+  };
+  const std::size_t dash = text.find('-');
+  if (dash != std::string_view::npos) {
+    out.own_request = identifier(text.substr(0, dash));
+    out.own_answer = identifier(text.substr(dash + 1));
+  }
+  if (out.own_request == 0 || out.own_answer == 0 || out.own_request == out.own_answer) {
+    fail(fmt::format(
+        "CHANNEL is own, or two COB-IDs that CiA 301 does not restrict, such as 684-6B4, not '{}'", text));
+  }
+}
+
 CanAddress parse_can(std::string_view rest, const AddressError& fail) {
   const std::vector<std::string_view> part = fields(rest);
-  if (part.size() > 2) fail("there are too many fields");
+  if (part.size() > 3) fail("there are too many fields");
   if (part[0].empty()) fail("the interface is missing");
   // A longer name would be cut off and could name another interface.
   if (part[0].size() >= IF_NAMESIZE) {
@@ -67,6 +99,7 @@ CanAddress parse_can(std::string_view rest, const AddressError& fail) {
   CanAddress out;
   out.interface = part[0];
   if (part.size() > 1) out.node = in_range<std::uint8_t>(part[1], "NODE", 1, 127, fail);
+  if (part.size() > 2) parse_channel(part[2], out, fail);
   return out;
 }
 
@@ -124,9 +157,19 @@ ModbusRtuAddress parse_rtu(std::string_view rest, const AddressError& fail) {
 
 }  // namespace
 
+std::uint16_t CanAddress::sdo_request() const {
+  return own_request != 0 ? own_request : static_cast<std::uint16_t>(co::sdo_request_id + node);
+}
+std::uint16_t CanAddress::sdo_answer() const {
+  return own_request != 0 ? own_answer : static_cast<std::uint16_t>(co::sdo_answer_id + node);
+}
+
 std::string BusAddress::text() const {
-  if (const auto* can = std::get_if<CanAddress>(&at))
-    return fmt::format("can:{}:{}", can->interface, can->node);
+  if (const auto* can = std::get_if<CanAddress>(&at)) {
+    const std::string channel =
+        can->own_request != 0 ? fmt::format(":{:X}-{:X}", can->own_request, can->own_answer) : "";
+    return fmt::format("can:{}:{}{}", can->interface, can->node, channel);
+  }
   if (const auto* tcp = std::get_if<ModbusTcpAddress>(&at)) {
     const bool v6 = tcp->host.find(':') != std::string::npos;
     return fmt::format("modbus-tcp:{}{}{}:{}:{}", v6 ? "[" : "", tcp->host, v6 ? "]" : "", tcp->port,

@@ -2,9 +2,12 @@
 /// \file
 /// Addresses of controllers: bus, interface or host, node or unit.
 ///
-///     can:IFACE[:NODE]                          NODE 1 … 127, default 1
+///     can:IFACE[:NODE[:CHANNEL]]                NODE 1 … 127, default 1; CHANNEL: own, or REQUEST-ANSWER in hex
 ///     modbus-tcp:HOST[:PORT][:UNIT]             PORT default 502, UNIT 0 … 255, default 255 (the device itself)
 ///     modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]  BAUD default 19200, PARITY N, E or O, default E, UNIT 1 … 247, default 1
+///
+/// CHANNEL is the SDO server 1201h in place of 1200h, by its COB-IDs; own stands for flexcomp's choice, 67Fh + node and
+/// 6AFh + node, for nodes up to 48 (flexcomp/wire/canopen_objects.hpp).
 ///
 /// The defaults are those of the standards (Modbus messaging on TCP/IP 1.0b, 4.4.1; serial line 1.02, 2.5.1). An IPv6
 /// address stands in square brackets. A serial line's fields are read from the right, so a DEVICE may contain
@@ -21,6 +24,11 @@ namespace flexcomp::host {
 struct CanAddress {
   std::string interface;
   std::uint8_t node = 1;
+  std::uint16_t own_request = 0;  ///< COB-ID of requests to 1201h; 0: 1200h is used
+  std::uint16_t own_answer = 0;   ///< COB-ID of its answers
+
+  std::uint16_t sdo_request() const;  ///< COB-ID of requests
+  std::uint16_t sdo_answer() const;   ///< COB-ID of answers
 };
 
 struct ModbusTcpAddress {

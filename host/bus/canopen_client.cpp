@@ -17,6 +17,7 @@
 
 #include "bus/controller_client.hpp"
 #include "bus/descriptor.hpp"
+#include "bus/heartbeats.hpp"
 #include "bus/sdo_client.hpp"
 #include "flexcomp/bytes.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
@@ -33,7 +34,9 @@ using namespace std::chrono_literals;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-Descriptor open_can(const std::string& interface, unsigned node, const std::string& where) {
+/// A CAN socket that receives data frames with 11 bits and identifiers that these filters let through; others stay in the
+/// kernel.
+Descriptor open_can(const std::string& interface, std::vector<can_filter> filters, const std::string& where) {
   Descriptor out(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (out.get() < 0) {
     throw BusError(where, fmt::format("this system gives no CAN sockets: {}", reason(errno)),
@@ -42,12 +45,12 @@ Descriptor open_can(const std::string& interface, unsigned node, const std::stri
   const unsigned index = if_nametoindex(interface.c_str());
   if (index == 0)
     throw BusError(where, fmt::format("there is no interface '{}'", interface), ErrorCode::bus_not_opened);
-  // Extended, remote and other nodes' frames stay in the kernel.
-  const can_filter answers{co::sdo_answer_id + node, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+  for (can_filter& filter : filters) filter.can_mask |= CAN_EFF_FLAG | CAN_RTR_FLAG;
   sockaddr_can to{};
   to.can_family = AF_CAN;
   to.can_ifindex = static_cast<int>(index);
-  if (::setsockopt(out.get(), SOL_CAN_RAW, CAN_RAW_FILTER, &answers, sizeof answers) != 0 ||
+  if (::setsockopt(out.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
+                   static_cast<socklen_t>(filters.size() * sizeof filters[0])) != 0 ||
       ::bind(out.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
     throw BusError(where, fmt::format("the interface '{}' cannot be used: {}", interface, reason(errno)),
                    ErrorCode::bus_not_opened);
@@ -61,7 +64,7 @@ Descriptor open_can(const std::string& interface, unsigned node, const std::stri
 Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, const std::string& where) {
   Descriptor out(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   if (out.get() < 0) throw BusError(where, fmt::format("no local socket: {}", reason(errno)));
-  const std::string name = fmt::format("flexcomp-sdo-{}-{}", can.interface, can.node);
+  const std::string name = fmt::format("flexcomp-sdo-{}-{:X}", can.interface, can.sdo_request());
   sockaddr_un at{};
   at.sun_family = AF_UNIX;
   // The first byte stays 0: an abstract name, without a file.
@@ -83,14 +86,17 @@ Descriptor lock_channel(const CanAddress& can, const ClientOptions& options, con
 class CanopenClient final : public ControllerClient {
  public:
   CanopenClient(const BusAddress& address, const ClientOptions& options, Descriptor channel,
-                Descriptor socket)
+                Descriptor socket, Heartbeats heartbeats)
       : ControllerClient(address, options),
-        node_(std::get<CanAddress>(address.at).node),
+        at_(std::get<CanAddress>(address.at)),
+        node_(at_.node),
         timeout_(options.response_timeout),
         channel_(std::move(channel)),
         socket_(std::move(socket)),
-        sdo_(socket_.get(), node_, timeout_) {
+        heartbeats_(std::move(heartbeats)),
+        sdo_(socket_.get(), at_.sdo_request(), at_.sdo_answer(), timeout_) {
     read_capability();
+    throw_where_two({});
   }
 
  protected:
@@ -151,6 +157,42 @@ class CanopenClient final : public ControllerClient {
            [&] { sdo_.download(object, data, progress); });
   }
 
+  /// Silence of less than this says nothing about nodes whose heartbeat time is one second.
+  static constexpr milliseconds heartbeats_within{1500};
+
+  /// Throws where two nodes have this number: one request is answered twice, and not with the same. Asks only where answers
+  /// have come twice since `before`; the same answer twice may be a gateway's.
+  void throw_where_two(const SdoDisturbances& before) {
+    if (sdo_.disturbances().doubled == before.doubled) return;
+    struct Question {
+      ObjectAddress object;
+      const char* text;
+    };
+    constexpr std::array<Question, 3> questions{{{{co::identity, 4}, "serial number"},
+                                                 {{co::identity, 3}, "firmware revision"},
+                                                 {{co::status_summary, 5}, "sequence of the active set"}}};
+    for (const Question& question : questions) {
+      const auto answers = sdo_.upload_from_all(question.object);
+      if (answers.size() < 2) return;
+      for (const auto& answer : answers) {
+        if (answer == answers[0]) continue;
+        throw BusError(
+            where(), fmt::format("two nodes have the number {}: each request is answered twice, with {} "
+                                 "0x{:X} and 0x{:X}",
+                                 node_, question.text, load_u32(answers[0].data()), load_u32(answer.data())));
+      }
+    }
+  }
+
+  /// Why node_ may be silent, for a message.
+  std::string silence() {
+    const std::string heard = heartbeats_.about(node_, heartbeats_within);
+    const bool is_there = heard.find(fmt::format("; node {}", node_)) == 0;
+    return is_there && at_.own_request != 0
+               ? fmt::format("{}, but may have no SDO server 1201h at {:X}h", heard, at_.own_request)
+               : heard;
+  }
+
   /// What was on the channel besides since `before`, for a message.
   std::string besides(const SdoDisturbances& before) const {
     SdoDisturbances now = sdo_.disturbances();
@@ -179,6 +221,7 @@ class CanopenClient final : public ControllerClient {
                                e.code() == co::abort::sequence || e.code() == co::abort::crc;
         if (!disturbed)
           throw BusRefusal{e.code() == co::abort::busy, e.code() == co::abort::no_object, e.what()};
+        if (attempt == 2) throw_where_two(before);
         if (steady_clock::now() - start >= longest) {
           throw BusError(where(),
                          fmt::format("node {}: asked {} object {}, the transfer was broken off {} "
@@ -189,9 +232,9 @@ class CanopenClient final : public ControllerClient {
                                      e.what(), besides(before)));
         }
       } catch (const SdoTimeout&) {
-        throw NoAnswer(where(), fmt::format("node {} did not answer for {:.2f} s when asked {} object {}{}",
+        throw NoAnswer(where(), fmt::format("node {} did not answer for {:.2f} s when asked {} object {}{}{}",
                                             node_, in_seconds(longest == 0ms ? timeout_ / 4 : timeout_), what,
-                                            object.text(), besides(before)));
+                                            object.text(), besides(before), silence()));
       } catch (const std::system_error& e) {
         throw BusError(where(), fmt::format("{}", e.what()));
       }
@@ -202,10 +245,12 @@ class CanopenClient final : public ControllerClient {
     }
   }
 
+  CanAddress at_;
   std::uint8_t node_;
   milliseconds timeout_;
   Descriptor channel_;
   Descriptor socket_;
+  Heartbeats heartbeats_;
   SdoClient sdo_;
   std::uint32_t last_argument_ = 1;  ///< another client's may still be there
 };
@@ -214,14 +259,19 @@ class CanopenClient final : public ControllerClient {
 
 std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options) {
   const auto& can = std::get<CanAddress>(address.at);
-  Descriptor socket = open_can(can.interface, can.node, address.text());
-  Descriptor channel = lock_channel(can, options, address.text());
-  return std::make_unique<CanopenClient>(address, options, std::move(channel), std::move(socket));
+  const std::string where = address.text();
+  Descriptor socket = open_can(can.interface, {{can.sdo_answer(), CAN_SFF_MASK}}, where);
+  constexpr canid_t of_any_node = CAN_SFF_MASK & ~0x7FU;
+  Descriptor unasked =
+      open_can(can.interface, {{co::heartbeat_id, of_any_node}, {co::emergency_id, of_any_node}}, where);
+  Descriptor channel = lock_channel(can, options, where);
+  return std::make_unique<CanopenClient>(address, options, std::move(channel), std::move(socket),
+                                         Heartbeats(std::move(unasked)));
 }
 
 std::unique_ptr<ControllerClient> connect_canopen(const BusAddress& address, const ClientOptions& options,
                                                   int socket) {
-  return std::make_unique<CanopenClient>(address, options, Descriptor(), Descriptor(socket));
+  return std::make_unique<CanopenClient>(address, options, Descriptor(), Descriptor(socket), Heartbeats());
 }
 
 }  // namespace flexcomp::host

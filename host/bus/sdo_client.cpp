@@ -131,11 +131,15 @@ std::string SdoDisturbances::text() const {
 }
 
 SdoClient::SdoClient(int socket, std::uint8_t node, milliseconds timeout)
-    : socket_(socket), node_(node), timeout_(timeout) {}
+    : SdoClient(socket, static_cast<std::uint16_t>(co::sdo_request_id + node),
+                static_cast<std::uint16_t>(co::sdo_answer_id + node), timeout) {}
+
+SdoClient::SdoClient(int socket, std::uint16_t request_id, std::uint16_t answer_id, milliseconds timeout)
+    : socket_(socket), request_id_(request_id), answer_id_(answer_id), timeout_(timeout) {}
 
 void SdoClient::send(const Payload& payload, steady_clock::time_point end) {
   can_frame frame{};
-  frame.can_id = co::sdo_request_id + node_;
+  frame.can_id = request_id_;
   frame.can_dlc = static_cast<__u8>(payload.size());
   std::copy(payload.begin(), payload.end(), frame.data);
   while (::send(socket_, &frame, sizeof frame, MSG_NOSIGNAL) != sizeof frame) {
@@ -165,8 +169,7 @@ bool SdoClient::receive(Payload& payload, steady_clock::time_point end) {
     }
     if (size == 0) throw std::system_error(ENODEV, std::generic_category(), "receiving a CAN frame");
     // The comparison also drops extended, remote and error frames: their flags are part of the id.
-    if (size != sizeof frame || frame.can_id != co::sdo_answer_id + unsigned{node_} ||
-        frame.can_dlc != payload.size()) {
+    if (size != sizeof frame || frame.can_id != answer_id_ || frame.can_dlc != payload.size()) {
       continue;
     }
     std::copy_n(frame.data, payload.size(), payload.begin());
@@ -509,6 +512,8 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
       now = steady_clock::now();
       end = now + timeout_;
       again = now + wait;
+    } else if (number <= taken) {
+      ++disturbances_.doubled;
     }
     if (last || number == most) take_stock();
   }
@@ -518,6 +523,24 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
   if (crc_given && crc != load_u16(answer.data() + 1)) abort(object, co::abort::crc);
   if (is_announced && out.size() != announced) abort(object, co::abort::too_short);
   send({static_cast<std::uint8_t>(block_upload | block_end)}, steady_clock::now() + timeout_);
+  return out;
+}
+
+std::vector<std::vector<std::uint8_t>> SdoClient::upload_from_all(ObjectAddress object) {
+  await_silence();
+  Payload frame{};
+  frame[0] = upload_initiate;
+  address(frame, object);
+  const auto wait = std::max(timeout_ / 12, milliseconds(2));
+  send(frame, steady_clock::now() + wait);
+  std::vector<std::vector<std::uint8_t>> out;
+  Payload answer;
+  constexpr std::size_t enough = 8;
+  while (out.size() < enough && receive(answer, steady_clock::now() + (out.empty() ? wait : wait / 2))) {
+    const bool same_object = std::equal(frame.begin() + 1, frame.begin() + 4, answer.begin() + 1);
+    const bool is_expedited = (answer[0] & (specifier_mask | expedited)) == (upload_initiated | expedited);
+    if (same_object && is_expedited) out.emplace_back(answer.begin() + 4, answer.end());
+  }
   return out;
 }
 

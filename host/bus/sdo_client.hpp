@@ -63,6 +63,8 @@ class SdoClient {
   /// \param timeout  limit of each answer of the server; requests are sent again after a twelfth of it, then after
   ///                 twice as long, and so on
   SdoClient(int socket, std::uint8_t node, std::chrono::milliseconds timeout);
+  /// The same over the channel of these COB-IDs.
+  SdoClient(int socket, std::uint16_t request_id, std::uint16_t answer_id, std::chrono::milliseconds timeout);
 
   /// Reads an object: expedited, segmented or, where more than in_few_segments bytes are expected, block upload (CiA 301,
   /// 7.2.4.3). A server that has no block transfer is asked for segments. \throws SdoAbort, SdoTimeout, std::system_error
@@ -72,6 +74,10 @@ class SdoClient {
   void download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress = {});
   /// The same for at most 4 bytes, sent once and waited for a quarter of the time limit: for what must not be done twice.
   void download_once(ObjectAddress object, std::span<const std::uint8_t> data);
+
+  /// All answers to one upload request of an object of at most 4 bytes: two where two nodes have one number. Waits for the
+  /// first one as long as upload() until it asks again, and half as long for the next.
+  std::vector<std::vector<std::uint8_t>> upload_from_all(ObjectAddress object);
 
   /// Bytes up to which a block transfer has no fewer frames than a segmented one.
   static constexpr std::size_t in_few_segments = 28;
@@ -114,7 +120,8 @@ class SdoClient {
   [[noreturn]] void abort(ObjectAddress object, std::uint32_t code);
 
   int socket_;
-  std::uint8_t node_;
+  std::uint16_t request_id_;
+  std::uint16_t answer_id_;
   std::chrono::milliseconds timeout_;
   Payload last_{};             ///< the last answer that was taken
   bool server_blocks_ = true;  ///< until it refuses

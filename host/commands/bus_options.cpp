@@ -17,9 +17,10 @@ void BusOptions::add_bus_to(CLI::App& app, const std::string& name) {
              throw CLI::ValidationError(name, e.what());
            }
          },
-         "Controller: can:IFACE[:NODE], modbus-tcp:HOST[:PORT][:UNIT] or "
+         "Controller: can:IFACE[:NODE[:CHANNEL]], modbus-tcp:HOST[:PORT][:UNIT] or "
          "modbus-rtu:DEVICE[:BAUD[:PARITY]][:UNIT]; "
-         "by default node 1; port 502, unit 255; 19200 baud, parity E, unit 1")
+         "by default node 1, CHANNEL own or 684-6B4 for SDO server 1201h; port 502, unit 255; 19200 baud, "
+         "parity E, unit 1")
       ->required()
       ->type_name("BUS");
   app.add_option("--timeout", timeout_s, "How long the controller may keep silent [s]")

@@ -25,6 +25,14 @@ namespace map = wire::modbus;
 
 // --- electronic data sheet -----------------------------------------------------------------------------------------------
 
+// Of the contents: whoever changes them raises the revision and sets the date (tests/hil/bus_files_test.cpp notices). CiA 306-1
+// has MM-DD-YYYY and hh:mm(AM|PM).
+constexpr unsigned file_revision = 1;
+constexpr const char* creation_date = "11-21-2026";
+constexpr const char* creation_time = "03:56PM";
+constexpr const char* modification_date = "11-22-2026";
+constexpr const char* modification_time = "09:30PM";
+
 constexpr unsigned variable_object = 7;
 constexpr unsigned domain_object = 2;
 constexpr unsigned array_object = 8;
@@ -50,19 +58,47 @@ class Sheet {
   std::string text_;
 };
 
-/// What never changes, or only with the node number.
+/// 1018h:3 of the firmware of this version: major << 16 | minor << 8 | patch.
+unsigned revision_number() {
+  unsigned out = 0;
+  unsigned part = 0;
+  for (const char c : std::string_view(FLEXCOMP_VERSION ".")) {
+    if (c != '.') {
+      part = 10 * part + static_cast<unsigned>(c - '0');
+    } else {
+      out = out << 8U | std::exchange(part, 0);
+    }
+  }
+  return out;
+}
+
+/// Arrays of CiA 301, 7.5.2; what else has sub-indices is a record.
+bool is_array(std::uint16_t index) {
+  return index == co::error_history || index == co::store_parameters || index == co::restore_parameters;
+}
+
+/// Value after a reset where the firmware alone says it; else nothing.
 std::string default_value(const co::Object& o, std::size_t highest_sub) {
   if (o.sub == 0 && o.type == co::Type::u8 && o.access == co::Access::constant)
     return fmt::format("{}", highest_sub);
   if (o.index == co::device_type) return "0x00000000";
   if (o.index == co::device_name) return "flexcomp";
+  if (o.index == co::software_version) return FLEXCOMP_VERSION;
   if (o.index == co::identity && o.sub == 1) return "0x00000000";
   if (o.index == co::identity && o.sub == 2) return fmt::format("0x{:08X}", co::product_code);
+  if (o.index == co::identity && o.sub == 3) return fmt::format("0x{:08X}", revision_number());
   if (o.index == co::error_history && o.sub == 0) return "0";
   if (o.index == co::emergency) return fmt::format("$NODEID+0x{:X}", co::emergency_id);
   if (o.index == co::emergency_inhibit) return fmt::format("{}", co::emergency_inhibit_default);
   if (o.index == co::sdo_server && o.sub == 1) return fmt::format("$NODEID+0x{:X}", co::sdo_request_id);
   if (o.index == co::sdo_server && o.sub == 2) return fmt::format("$NODEID+0x{:X}", co::sdo_answer_id);
+  if (o.index == co::sdo_channel) return fmt::format("0x{:08X}", co::not_valid);
+  if (o.index == co::pdo && o.sub == co::pdo_cob_id)
+    return fmt::format("$NODEID+0x{:08X}", co::not_valid | co::no_remote_frames | co::pdo_id);
+  if (o.index == co::pdo && o.sub == co::pdo_transmission) return fmt::format("{}", co::pdo_event_driven);
+  if (o.index == co::pdo && o.sub == co::pdo_inhibit) return fmt::format("{}", co::pdo_inhibit_default);
+  if (o.index == co::pdo && o.sub == co::pdo_timer) return "0";
+  if (o.index == co::pdo_mapping) return fmt::format("0x{:08X}", co::pdo_mapped.at(o.sub - 1U));
   return "";
 }
 
@@ -74,8 +110,9 @@ void put_object(Sheet& sheet, const co::Object& o, const std::string& section, c
   sheet.put("ObjectType", fmt::format("0x{:X}", domain && o.sub == 0 ? domain_object : variable_object));
   sheet.put("DataType", fmt::format("0x{:04X}", static_cast<unsigned>(o.type)));
   sheet.put("AccessType", access(o.access));
-  sheet.put("DefaultValue", default_value(o, highest_sub));
-  sheet.put("PDOMapping", 0);
+  const std::string value = default_value(o, highest_sub);
+  if (!value.empty()) sheet.put("DefaultValue", value);
+  sheet.put("PDOMapping", co::is_mapped(o) ? 1U : 0U);
 }
 
 // --- register map --------------------------------------------------------------------------------------------------------
@@ -235,31 +272,38 @@ std::string electronic_data_sheet(const std::string& file) {
   sheet.section("FileInfo");
   sheet.put("FileName", file);
   sheet.put("FileVersion", 1);
-  sheet.put("FileRevision", 0);
+  sheet.put("FileRevision", file_revision);
   sheet.put("EDSVersion", "4.0");
   sheet.put("Description", "flexcomp " FLEXCOMP_VERSION ": compensation of a robot arm");
+  sheet.put("CreationTime", creation_time);
+  sheet.put("CreationDate", creation_date);
   sheet.put("CreatedBy", "flexcomp " FLEXCOMP_VERSION);
+  sheet.put("ModificationTime", modification_time);
+  sheet.put("ModificationDate", modification_date);
+  sheet.put("ModifiedBy", "flexcomp " FLEXCOMP_VERSION);
   sheet.section("DeviceInfo");
   sheet.put("VendorName", "flexcomp");
   sheet.put("VendorNumber", "0x0");
   sheet.put("ProductName", "flexcomp");
   sheet.put("ProductNumber", fmt::format("0x{:08X}", co::product_code));
-  sheet.put("RevisionNumber", 0);
+  sheet.put("RevisionNumber", fmt::format("0x{:08X}", revision_number()));
   sheet.put("OrderCode", "flexcomp");
   // Bit timing is the board's; CiA 301 names these rates.
   for (const int rate : {10, 20, 50, 125, 250, 500, 800, 1000})
     sheet.put(fmt::format("BaudRate_{}", rate), 1);
   sheet.put("SimpleBootUpMaster", 0);
   sheet.put("SimpleBootUpSlave", 1);
-  for (const char* none : {"Granularity", "DynamicChannelsSupported", "GroupMessaging", "NrOfRXPDO",
-                           "NrOfTXPDO", "LSS_Supported"})
+  for (const char* none : {"Granularity", "DynamicChannelsSupported", "GroupMessaging", "NrOfRXPDO"})
     sheet.put(none, 0);
+  sheet.put("NrOfTXPDO", 1);
+  sheet.put("LSS_Supported", 0);
   sheet.section("DummyUsage");
   for (unsigned k = 1; k <= 7; ++k) sheet.put(fmt::format("Dummy{:04X}", k), 0);
   sheet.section("Comments");
   sheet.put("Lines", 2);
   sheet.put("Line1", "Records of type DOMAIN are described in include/flexcomp/wire/store_state.hpp.");
-  sheet.put("Line2", "SDO transfers are expedited, segmented or in blocks; there are no PDOs.");
+  sheet.put("Line2",
+            "SDO transfers are expedited, segmented or in blocks; the mapping of the TPDO is fixed.");
   const std::array<const char*, 3> names{"MandatoryObjects", "OptionalObjects", "ManufacturerObjects"};
   for (std::size_t list = 0; list < lists.size(); ++list) {
     sheet.section(names[list]);
@@ -277,8 +321,7 @@ std::string electronic_data_sheet(const std::string& file) {
       }
       sheet.section(section);
       sheet.put("ParameterName", co::record_name(index));
-      sheet.put("ObjectType",
-                fmt::format("0x{:X}", index == co::error_history ? array_object : record_object));
+      sheet.put("ObjectType", fmt::format("0x{:X}", is_array(index) ? array_object : record_object));
       sheet.put("SubNumber", static_cast<unsigned>(objects.size()));
       for (const co::Object* o : objects)
         put_object(sheet, *o, fmt::format("{}sub{:X}", section, o->sub), o->name, objects.back()->sub);

@@ -12,8 +12,8 @@
 
 namespace flexcomp::host {
 
-/// CiA 306, EDS version 4.0. `file` is the name it is going to have; date and time are left out on purpose: the same
-/// version gives the same bytes.
+/// CiA 306-1, EDS version 4.0. `file` is the name it is going to have. Revision and dates are those of the contents, not of
+/// the export: the same version gives the same bytes.
 std::string electronic_data_sheet(const std::string& file);
 
 /// One number (or run of bytes) of the register map.

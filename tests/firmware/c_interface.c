@@ -202,6 +202,12 @@ int main(void) {
   can = flexcomp_can_init(&can_memory, sizeof can_memory, fc, 3, 1000, send_frame, NULL);
   flexcomp_can_set_memory(can, load_communication, save_communication, &calls);
   flexcomp_can_set_block_size(can, 16);
+  EXPECT(flexcomp_can_channel(can) == 0);
+  EXPECT(flexcomp_can_set_channel(can, 0x603, 0x6B2) == 0);
+  EXPECT(flexcomp_can_set_channel(can, 0x80000682U, 0x6B2) == 0);
+  EXPECT(flexcomp_can_channel(can) == 0);
+  EXPECT(flexcomp_can_set_channel(can, 0x682, 0x6B2) != 0);
+  EXPECT(flexcomp_can_channel(can) == 0x682);
   flexcomp_can_poll(can, 0);
   /* Boot-up message, EMCY: no valid set. */
   EXPECT(frame_count == 2 && frames[0] == 0x703 && frames[1] == 0x083);

@@ -527,22 +527,18 @@ def judge_candump(frames, image):
 
 
 class HandMadeSdo:
-    """SDO by hand over python-can."""
+    """SDO by hand over python-can, on the channel of these COB-IDs."""
 
-    def __init__(self, bus):
+    def __init__(self, bus, request=0x600 + NODE, answer=0x580 + NODE):
         self.bus = bus
+        self.request = request
+        self.answer = answer
 
     def ask(self, request):
-        import can
         while self.bus.recv(0) is not None:  # what others have asked since
             pass
-        self.bus.send(can.Message(arbitration_id=0x600 + NODE, data=request, is_extended_id=False))
-        end = time.monotonic() + SLACK
-        while time.monotonic() < end:
-            message = self.bus.recv(0.5)
-            if message is not None and message.arbitration_id == 0x580 + NODE:
-                return bytes(message.data)
-        check(False, "an SDO answer to python-can", bytes(request).hex())
+        self.send(request)
+        return self.next(bytes(request).hex())
 
     def upload(self, index, sub):
         answer = self.ask([0x40, index & 0xFF, index >> 8, sub, 0, 0, 0, 0])
@@ -560,18 +556,17 @@ class HandMadeSdo:
                 check(len(out) == size, "as long as was announced")
                 return out
 
-
     def send(self, data):
         import can
-        self.bus.send(can.Message(arbitration_id=0x600 + NODE, data=data, is_extended_id=False))
+        self.bus.send(can.Message(arbitration_id=self.request, data=data, is_extended_id=False))
 
-    def next(self):
+    def next(self, *details):
         end = time.monotonic() + SLACK
         while time.monotonic() < end:
             message = self.bus.recv(0.5)
-            if message is not None and message.arbitration_id == 0x580 + NODE:
+            if message is not None and message.arbitration_id == self.answer:
                 return bytes(message.data)
-        check(False, "an SDO answer to python-can")
+        check(False, "an SDO answer to python-can", *details)
 
     def upload_block(self, index, sub, blocks, lose=()):
         """Block upload with these sizes of sub-blocks in turn; loses the frames with these numbers."""
@@ -583,6 +578,7 @@ class HandMadeSdo:
             taken = 0
             while True:
                 segment = self.next()
+                check(segment[0] != 0x80, "a segment of a block upload", segment.hex())
                 frames += 1
                 number, last = segment[0] & 0x7F, bool(segment[0] & 0x80)
                 if number == taken + 1 and frames not in lose:

@@ -127,6 +127,11 @@ class Device {
   /// Writes the robot record into `out`, of wire::robot_record_bytes.
   void robot_record(wire::ByteOrder order, std::uint8_t* out) const;
 
+  /// Writes `size` bytes of the little-endian robot record, from `offset` on.
+  void robot_record_part(std::uint32_t offset, std::uint8_t* out, std::uint32_t size) const {
+    wire::encode_part(robot_, name_.data(), name_size_, offset, out, size);
+  }
+
   /// Correction of a joint in the last control cycle; of any joint since the start for joint = 6. deg.
   float correction_deg(std::size_t joint) const;
 

@@ -79,6 +79,19 @@ constexpr Object objects[] = {
     {sdo_server, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {sdo_server, 1, Type::u32, Access::ro, 4, "COB-ID client to server"},
     {sdo_server, 2, Type::u32, Access::ro, 4, "COB-ID server to client"},
+    {sdo_channel, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {sdo_channel, 1, Type::u32, Access::rw, 4, "COB-ID client to server"},
+    {sdo_channel, 2, Type::u32, Access::rw, 4, "COB-ID server to client"},
+    {pdo, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
+    {pdo, pdo_cob_id, Type::u32, Access::rw, 4, "COB-ID"},
+    {pdo, pdo_transmission, Type::u8, Access::rw, 1, "Transmission type"},
+    {pdo, pdo_inhibit, Type::u16, Access::rw, 2, "Inhibit time, 100 us"},
+    {pdo, pdo_timer, Type::u16, Access::rw, 2, "Event timer, ms"},
+    {pdo_mapping, 0, Type::u8, Access::constant, 1, "Number of mapped objects"},
+    {pdo_mapping, 1, Type::u32, Access::constant, 4, "Mapped object 1"},
+    {pdo_mapping, 2, Type::u32, Access::constant, 4, "Mapped object 2"},
+    {pdo_mapping, 3, Type::u32, Access::constant, 4, "Mapped object 3"},
+    {pdo_mapping, 4, Type::u32, Access::constant, 4, "Mapped object 4"},
     {capability, 0, Type::domain, Access::ro, capability_bytes, "Capability record"},
     {status, 0, Type::domain, Access::ro, status_bytes, "Status record"},
     {status_summary, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
@@ -89,6 +102,8 @@ constexpr Object objects[] = {
     {status_summary, 5, Type::u32, Access::ro, 4, "Sequence of the active set"},
     {status_summary, 6, Type::u32, Access::ro, 4, "Detail"},
     {status_summary, 7, Type::u32, Access::ro, 4, "Control cycles until a trial reverts"},
+    {status_summary, 8, Type::u8, Access::ro, 1, "State of the parameter store, 8 bits"},
+    {status_summary, 9, Type::u8, Access::ro, 1, "Status of the last control cycle"},
     {robot, 0, Type::domain, Access::ro, robot_record_bytes, "Robot record"},
     {certificate, 0, Type::domain, Access::ro, certificate_bytes, "Certificate record"},
     {certificate_summary, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
@@ -123,6 +138,21 @@ constexpr Object objects[] = {
 /// Number of entries of `objects`.
 constexpr std::size_t object_count = sizeof objects / sizeof objects[0];
 
+/// Whether the TPDO holds this object.
+constexpr bool is_mapped(const Object& o) {
+  for (const std::uint32_t m : pdo_mapped) {
+    if (m == (std::uint32_t{o.index} << 16U | std::uint32_t{o.sub} << 8U | 8U * o.size)) return true;
+  }
+  return false;
+}
+
+constexpr std::size_t mapped_count() {
+  std::size_t count = 0;
+  for (const Object& o : objects) count += is_mapped(o) ? 1U : 0U;
+  return count;
+}
+static_assert(mapped_count() == pdo_mapped.size(), "the TPDO holds objects of the table, whole");
+
 /// Name in the EDS of an object that has sub-indices.
 constexpr const char* record_name(std::uint16_t index) {
   switch (index) {
@@ -135,7 +165,12 @@ constexpr const char* record_name(std::uint16_t index) {
     case identity:
       return "Identity object";
     case sdo_server:
+    case sdo_channel:
       return "SDO server parameter";
+    case pdo:
+      return "TPDO communication parameter";
+    case pdo_mapping:
+      return "TPDO mapping parameter";
     case status_summary:
       return "Status for people";
     case certificate_summary:

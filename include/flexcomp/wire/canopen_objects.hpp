@@ -27,9 +27,19 @@
 ///     0x1200   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      ro      COB-ID of requests, 0x600 + node
 ///              2  UNSIGNED32      ro      COB-ID of answers, 0x580 + node
+///     0x1201   0  UNSIGNED8       const   2
+///              1  UNSIGNED32      rw      COB-ID of requests to the second server; bit 31: there is none
+///              2  UNSIGNED32      rw      COB-ID of its answers; bit 31: there is none
+///     0x1800   0  UNSIGNED8       const   5
+///              1  UNSIGNED32      rw      COB-ID of the TPDO, 0x180 + node; bit 31: none is sent; bit 30: set
+///              2  UNSIGNED8       rw      transmission type: 254 or 255, at events
+///              3  UNSIGNED16      rw      between two of them at least, 100 us
+///              5  UNSIGNED16      rw      event timer, ms: sent so long after the last one; 0: none
+///     0x1A00   0  UNSIGNED8       const   4
+///            1-4  UNSIGNED32      const   0x2002:8, 9, 4, 5
 ///     0x2000   0  DOMAIN          ro      capability record
 ///     0x2001   0  DOMAIN          ro      status record
-///     0x2002   0  UNSIGNED8       const   7: status as single values
+///     0x2002   0  UNSIGNED8       const   9: status as single values
 ///              1  UNSIGNED16      ro      state (wire::StoreState)
 ///              2  UNSIGNED16      ro      answer to the last command (wire::Answer)
 ///              3  UNSIGNED16      ro      refusal of the last command (flexcomp::Refusal)
@@ -37,6 +47,8 @@
 ///              5  UNSIGNED32      ro      sequence of the active set
 ///              6  UNSIGNED32      ro      detail
 ///              7  UNSIGNED32      ro      control cycles until a trial reverts
+///              8  UNSIGNED8       ro      state, as sub 1
+///              9  UNSIGNED8       ro      StepStatus of the last control cycle
 ///     0x2003   0  DOMAIN          ro      robot record (robot_record.hpp)
 ///     0x2004   0  DOMAIN          ro      certificate record of the active set (certificate_record.hpp)
 ///     0x2005   0  UNSIGNED8       const   9: certificate as single values
@@ -52,8 +64,8 @@
 ///              1  UNSIGNED32      rw      argument of the next command
 ///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads the last one
 ///     0x2020   0  UNSIGNED8       const   2
-///              1  DOMAIN          rw      probe request record; its download answers it
-///              2  DOMAIN          ro      probe response record
+///              1  DOMAIN          rw      probe request record
+///              2  DOMAIN          ro      probe response record, by the set that is active when it is read
 ///     0x2021   0  UNSIGNED8       const   7: corrections
 ///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
 ///              7  REAL32          ro      largest correction of any joint since the start, deg
@@ -74,9 +86,14 @@
 /// - SDO is served in pre-operational and operational: expedited, segmented, and in blocks with CRC (CiA 301,
 ///   7.2.4.3). A sub-block of a download has at most most_segments, and sizes of sub-blocks alternate between
 ///   two numbers, so that a frame that comes twice is known.
+/// - 0x1201 is a second server, for flexcomp beside a master that has 0x1200. Each has a transfer of its own, is a client of
+///   its own to the store, and has 0x2011 and 0x2020 of its own.
+/// - The TPDO is sent in operational only: at its start, when one of the mapped objects has changed, and after the event
+///   timer. After a reset bit 31 is set: a node that sends what nobody has asked for is a surprise on a network.
 #ifndef FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 #define FLEXCOMP_WIRE_CANOPEN_OBJECTS_HPP
 
+#include <array>
 #include <cstdint>
 
 #include "flexcomp/status.hpp"
@@ -102,19 +119,26 @@ constexpr std::uint32_t communication_bytes = 8;      ///< of their memory
 constexpr std::uint16_t heartbeat_time = 0x1017;      ///< CiA 301, 7.5.2.20
 constexpr std::uint16_t identity = 0x1018;            ///< CiA 301, 7.5.2.21
 constexpr std::uint16_t sdo_server = 0x1200;          ///< CiA 301, 7.5.2.33
-constexpr std::uint16_t capability = 0x2000;          ///< capability record
-constexpr std::uint16_t status = 0x2001;              ///< status record
-constexpr std::uint16_t status_summary = 0x2002;      ///< status as single values
-constexpr std::uint16_t image = 0x2010;               ///< parameter image
-constexpr std::uint8_t image_staging = 1;             ///< sub-index: image into staging
-constexpr std::uint8_t image_active = 2;              ///< sub-index: active image
-constexpr std::uint16_t command = 0x2011;             ///< command and its argument
-constexpr std::uint8_t command_argument = 1;          ///< sub-index: argument of the next command
-constexpr std::uint8_t command_number = 2;            ///< sub-index: command
-constexpr std::uint16_t probe = 0x2020;               ///< probe request and response
-constexpr std::uint8_t probe_request = 1;             ///< sub-index: request record
-constexpr std::uint8_t probe_response = 2;            ///< sub-index: response record
-constexpr std::uint16_t corrections = 0x2021;         ///< of the last control cycle
+constexpr std::uint16_t sdo_channel = 0x1201;         ///< the second server, CiA 301, 7.5.2.33
+constexpr std::uint16_t pdo = 0x1800;             ///< communication parameters of the TPDO, CiA 301, 7.5.2.37
+constexpr std::uint8_t pdo_cob_id = 1;            ///< sub-index
+constexpr std::uint8_t pdo_transmission = 2;      ///< sub-index: transmission type
+constexpr std::uint8_t pdo_inhibit = 3;           ///< sub-index: inhibit time, 100 us
+constexpr std::uint8_t pdo_timer = 5;             ///< sub-index: event timer, ms
+constexpr std::uint16_t pdo_mapping = 0x1A00;     ///< of the TPDO, CiA 301, 7.5.2.38
+constexpr std::uint16_t capability = 0x2000;      ///< capability record
+constexpr std::uint16_t status = 0x2001;          ///< status record
+constexpr std::uint16_t status_summary = 0x2002;  ///< status as single values
+constexpr std::uint16_t image = 0x2010;           ///< parameter image
+constexpr std::uint8_t image_staging = 1;         ///< sub-index: image into staging
+constexpr std::uint8_t image_active = 2;          ///< sub-index: active image
+constexpr std::uint16_t command = 0x2011;         ///< command and its argument
+constexpr std::uint8_t command_argument = 1;      ///< sub-index: argument of the next command
+constexpr std::uint8_t command_number = 2;        ///< sub-index: command
+constexpr std::uint16_t probe = 0x2020;           ///< probe request and response
+constexpr std::uint8_t probe_request = 1;         ///< sub-index: request record
+constexpr std::uint8_t probe_response = 2;        ///< sub-index: response record
+constexpr std::uint16_t corrections = 0x2021;     ///< of the last control cycle
 
 constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2.13
 constexpr std::uint32_t load_signature = 0x64616F6C;  ///< "load", CiA 301 7.5.2.14
@@ -139,6 +163,7 @@ inline std::uint16_t crc16(std::uint16_t crc, const std::uint8_t* bytes, std::ui
 // COB-IDs of the pre-defined connection set (CiA 301, 7.3.5).
 constexpr std::uint16_t nmt_id = 0x000;          ///< NMT commands, from the master
 constexpr std::uint16_t emergency_id = 0x080;    ///< + node
+constexpr std::uint16_t pdo_id = 0x180;          ///< + node, TPDO 1
 constexpr std::uint16_t sdo_answer_id = 0x580;   ///< + node, server to client
 constexpr std::uint16_t sdo_request_id = 0x600;  ///< + node, client to server
 constexpr std::uint16_t heartbeat_id = 0x700;    ///< + node
@@ -169,8 +194,23 @@ constexpr std::uint16_t older_slot = 0x6302;      ///< fault::older_slot
 constexpr std::uint16_t trial_reverted = 0x6303;  ///< fault::trial_reverted
 }  // namespace emergency_code
 
-/// COB-ID bit 31 of 0x1014: no EMCY.
-constexpr std::uint32_t emergency_off = 0x80000000;
+/// Bit 31 of a COB-ID in 0x1014, 0x1201 and 0x1800: it is not used.
+constexpr std::uint32_t not_valid = 0x80000000;
+/// Bit 30 of the COB-ID in 0x1800: the TPDO is not sent on a remote frame.
+constexpr std::uint32_t no_remote_frames = 0x40000000;
+/// Transmission type of the TPDO: 254 and 255, at events (CiA 301, 7.5.2.37).
+constexpr std::uint8_t pdo_event_driven = 254;
+/// Inhibit time of the TPDO after a reset, 100 us.
+constexpr std::uint16_t pdo_inhibit_default = 1000;
+/// What the TPDO holds: index, sub-index and bits of an object, in order.
+constexpr std::array<std::uint32_t, 4> pdo_mapped = {0x20020808, 0x20020908, 0x20020410, 0x20020520};
+
+/// Requests over 0x1201 where flexcomp chooses, for nodes 1 … 48; answers 30h above. The 96 identifiers from 680h to 6DFh are
+/// neither restricted nor those of any node's pre-defined connection set (CiA 301, 7.3.5): two for each of 48 nodes.
+constexpr std::uint16_t channel_request_id = 0x67F;  ///< + node
+constexpr std::uint16_t channel_answer_id = 0x6AF;   ///< + node
+constexpr std::uint8_t most_channels = 48;           ///< nodes that have them
+
 /// Between two EMCY after a reset, 100 us.
 constexpr std::uint16_t emergency_inhibit_default = 1000;
 

@@ -74,6 +74,29 @@ inline void encode(const NominalRobot<joints>& robot, const char* name, std::siz
   writer.skip(robot_name_bytes - size);
 }
 
+/// Writes `size` bytes of the little-endian record into `out`, from `offset` on: the record in pieces, without memory for it.
+inline void encode_part(const NominalRobot<joints>& robot, const char* name, std::size_t name_size,
+                        std::size_t offset, std::uint8_t* out, std::size_t size) {
+  std::size_t at = 0;
+  const auto put = [&](std::uint8_t byte) {
+    if (at >= offset && at - offset < size) out[at - offset] = byte;
+    ++at;
+  };
+  detail::visit_robot(robot, [&](double value) {
+    if (at + sizeof value <= offset || at >= offset + size) {
+      at += sizeof value;
+      return;
+    }
+    const std::uint64_t bits = bits_of(value);
+    for (unsigned k = 0; k < 64; k += 8) put(static_cast<std::uint8_t>(bits >> k));
+  });
+  const std::size_t length = name_size <= robot_name_bytes ? name_size : 0;
+  put(static_cast<std::uint8_t>(length));
+  put(0);
+  for (std::size_t k = 0; k < robot_name_bytes; ++k)
+    put(k < length ? static_cast<std::uint8_t>(name[k]) : std::uint8_t{0});
+}
+
 /// Reads the record from `in` (robot_record_bytes), all but the name's hash; returns the length of the name,
 /// whose bytes are written to `name` (robot_name_bytes). A length that cannot be is read as 0.
 inline std::size_t decode(const std::uint8_t* in, ByteOrder order, NominalRobot<joints>& robot, char* name) {

@@ -15,6 +15,9 @@ std::string full(const char* text) { return parse_bus_address(text).text(); }
 TEST(BusAddress, FillsInTheDefaultsOfTheStandards) {
   EXPECT_EQ(full("can:vcan0"), "can:vcan0:1");
   EXPECT_EQ(full("can:can1:127"), "can:can1:127");
+  EXPECT_EQ(full("can:vcan0:5:own"), "can:vcan0:5:684-6B4");
+  EXPECT_EQ(full("can:vcan0:48:own"), "can:vcan0:48:6AF-6DF");
+  EXPECT_EQ(full("can:vcan0:127:3ff-1a0"), "can:vcan0:127:3FF-1A0");
   EXPECT_EQ(full("modbus-tcp:localhost"), "modbus-tcp:localhost:502:255");
   EXPECT_EQ(full("modbus-tcp:10.0.0.7:1502"), "modbus-tcp:10.0.0.7:1502:255");
   EXPECT_EQ(full("modbus-tcp:10.0.0.7:1502:0"), "modbus-tcp:10.0.0.7:1502:0");
@@ -43,11 +46,18 @@ TEST(BusAddress, SaysWhatIsWrongAndWhatIsExpected) {
   };
   EXPECT_EQ(complaint("can:vcan0:128"),
             "bus address 'can:vcan0:128': NODE is a whole number from 1 to 127, not '128'; expected "
-            "can:IFACE[:NODE]");
+            "can:IFACE[:NODE[:CHANNEL]]");
   using testing::HasSubstr;
   EXPECT_THAT(complaint("can:vcan0:0"), HasSubstr("NODE is a whole number from 1 to 127, not '0'"));
   EXPECT_THAT(complaint("can:vcan0:0x5"), HasSubstr("not '0x5'"));
-  EXPECT_THAT(complaint("can:vcan0:5:6"), HasSubstr("too many fields"));
+  EXPECT_THAT(complaint("can:vcan0:5:own:7"), HasSubstr("too many fields"));
+  for (const char* channel : {"6", "", "Own", "684", "684-", "-6B4", "684-684", "684-6B4-", "0x684-0x6B4",
+                              "605-6B4", "684-585", "0-6B4", "684-6E0", "684-10684", "684 -6B4"}) {
+    EXPECT_THAT(complaint((std::string("can:vcan0:5:") + channel).c_str()),
+                HasSubstr("CHANNEL is own, or two COB-IDs"))
+        << channel;
+  }
+  EXPECT_THAT(complaint("can:vcan0:49:own"), HasSubstr("'own' is for nodes up to 48"));
   EXPECT_THAT(complaint("can:"), HasSubstr("the interface is missing"));
   EXPECT_THAT(complaint("can:an-interface-too-long:1"), HasSubstr("at most 15 characters"));
   EXPECT_THAT(complaint("modbus-tcp:"), HasSubstr("the host is missing"));
@@ -62,7 +72,7 @@ TEST(BusAddress, SaysWhatIsWrongAndWhatIsExpected) {
   EXPECT_THAT(complaint("modbus-rtu:/dev/ttyS0:299"), HasSubstr("BAUD is a whole number from 300"));
   EXPECT_THAT(complaint("modbus-rtu:"), HasSubstr("the device is missing"));
   EXPECT_THAT(complaint("canopen:vcan0"),
-              HasSubstr("no such kind of bus; expected can:IFACE[:NODE], modbus-tcp:"));
+              HasSubstr("no such kind of bus; expected can:IFACE[:NODE[:CHANNEL]], modbus-tcp:"));
   EXPECT_THAT(complaint(""), HasSubstr("no such kind of bus"));
 }
 

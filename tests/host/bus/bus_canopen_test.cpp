@@ -13,8 +13,10 @@
 #include <map>
 #include <mutex>
 #include <thread>
+#include <tuple>
 #include <utility>
 
+#include "bus/heartbeats.hpp"
 #include "bus/sdo_client.hpp"
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/canopen_objects.hpp"
@@ -497,6 +499,112 @@ TEST(CanopenClient, EveryDoubledAnswerLeavesAPushAlone) {
   const auto start = steady_clock::now();
   EXPECT_EQ(push_image(*client, numbered_image(1001, 3)).active_sequence, 3U);
   EXPECT_LT(steady_clock::now() - start, milliseconds(1000));
+}
+
+TEST(CanopenClient, TwoNodesWithOneNumberAreNamed) {
+  // Two arms that differ in one object only; in the last case in none that is read, as one node behind a gateway that doubles.
+  for (const auto& [index, sub, words] :
+       {std::tuple<unsigned, unsigned, const char*>{0x1018, 4, "serial number 0x1 and 0x2"},
+        {0x1018, 3, "firmware revision 0x1 and 0x2"},
+        {0x2002, 5, "sequence of the active set 0x1 and 0x2"},
+        {0x2000, 0, nullptr}}) {
+    std::array<CanopenDevice, 2> devices;
+    for (std::uint8_t k = 0; k < 2; ++k) {
+      devices[k].server.read =
+          [&, k, object = ObjectAddress{static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)},
+           read = devices[k].server.read](ObjectAddress o, Bytes& value) {
+            const std::uint32_t code = read(o, value);
+            if (o.index != 0x1018 && o.index != 0x2002) return code;
+            const bool differs = o.index == object.index && o.sub == object.sub;
+            value = {static_cast<std::uint8_t>(differs ? k + 1 : 7), 0, 0, 0};
+            return 0U;
+          };
+    }
+    Bus bus([&](const can_frame& in, const auto& put) {
+      for (CanopenDevice& device : devices) device.server(in, put);
+    });
+    if (words == nullptr) {
+      EXPECT_EQ(client_on(bus)->capability().terms, 64);
+      continue;
+    }
+    const BusError e = thrown<BusError>([&] { client_on(bus); });
+    EXPECT_THAT(
+        e.what(),
+        HasSubstr(std::string("two nodes have the number 5: each request is answered twice, with ") + words));
+  }
+}
+
+TEST(CanopenClient, TwoNodesThatAnswerDifferentlyAreNamedInPlaceOfAnEndlessTransfer) {
+  std::array<CanopenDevice, 2> devices;
+  for (std::uint8_t k = 0; k < 2; ++k) {
+    devices[k].server.read = [k, read = devices[k].server.read](ObjectAddress o, Bytes& value) {
+      if (o.index == 0x1018) return value = {k, 0, 0, 1}, 0U;
+      const std::uint32_t code = read(o, value);
+      // The second one's records are shorter, so that its transfers end before the first one's.
+      if (k == 1 && value.size() > 20) value.resize(20);
+      return code;
+    };
+  }
+  Bus bus([&](const can_frame& in, const auto& put) {
+    for (CanopenDevice& device : devices) device.server(in, put);
+  });
+  const auto start = steady_clock::now();
+  EXPECT_THAT(
+      thrown<BusError>([&] { client_on(bus); }).what(),
+      HasSubstr(
+          "two nodes have the number 5: each request is answered twice, with serial number 0x1000000 and "
+          "0x1000001"));
+  EXPECT_LT(steady_clock::now() - start, quick().response_timeout * 5);
+}
+
+/// What Heartbeats says about `asked` after these frames.
+std::string heard_about(std::uint8_t asked, std::initializer_list<std::pair<unsigned, int>> frames) {
+  int ends[2] = {-1, -1};
+  EXPECT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
+  Heartbeats heartbeats{Descriptor(ends[0])};
+  const Descriptor far(ends[1]);
+  for (const auto& [id, state] : frames) {
+    can_frame f{};
+    f.can_id = id;
+    f.can_dlc = state < 0 ? 8 : 1;
+    f.data[0] = static_cast<std::uint8_t>(state);
+    EXPECT_EQ(::send(far.get(), &f, sizeof f, 0), static_cast<ssize_t>(sizeof f));
+  }
+  return heartbeats.about(asked, milliseconds(20));
+}
+
+TEST(Heartbeats, TellWhoIsThere) {
+  EXPECT_EQ(Heartbeats().about(5, milliseconds(60000)), "") << "without a socket, and without waiting";
+  EXPECT_EQ(heard_about(5, {}), "; nothing was heard");
+  EXPECT_EQ(heard_about(5, {{0x705, 4}}), "; node 5 is stopped");
+  EXPECT_EQ(heard_about(5, {{0x705, 127}, {0x707, 5}}), "; node 5 is pre-operational");
+  EXPECT_EQ(heard_about(5, {{0x705, 0}}), "; node 5 is starting");
+  EXPECT_EQ(heard_about(5, {{0x705, 0}, {0x705, 127}, {0x705, 5}}), "; node 5 is operational");
+  EXPECT_EQ(heard_about(5, {{0x705, 0x84}}), "; node 5 is stopped") << "node guarding";
+  EXPECT_EQ(heard_about(5, {{0x705, 77}}), "; node 5 is in state 77, which CiA 301 does not know");
+  EXPECT_EQ(heard_about(5, {{0x707, 5}, {0x703, 127}, {0x707, 5}, {0x087, -1}}), "; heard here: 3, 7");
+  EXPECT_EQ(heard_about(5, {{0x085, -1}}), "; node 5 sends EMCY");
+  EXPECT_EQ(heard_about(5, {{0x080, -1}, {0x700, 5}, {0x605, -1}, {0x80000705U, 5}, {0x40000705U, 5}}),
+            "; nothing was heard")
+      << "SYNC, node 0, requests, extended and remote frames";
+  EXPECT_EQ(heard_about(5, {{0x705, -1}}), "; nothing was heard") << "8 bytes are no heartbeat";
+}
+
+TEST(Heartbeats, TellTwoNodesWithOneNumberWhereTheirStatesDiffer) {
+  const char* two = "; two nodes have the number 5: its heartbeats say ";
+  EXPECT_EQ(heard_about(5, {{0x705, 5}, {0x705, 127}, {0x705, 5}, {0x705, 127}, {0x705, 5}}),
+            std::string(two) + "operational and pre-operational by turns");
+  EXPECT_EQ(heard_about(5, {{0x705, 5}, {0x705, 4}, {0x705, 5}, {0x705, 4}, {0x705, 5}, {0x705, 4}}),
+            std::string(two) + "stopped and operational by turns");
+  // A master that starts, stops and starts it; resets; one state after the other.
+  EXPECT_EQ(heard_about(5, {{0x705, 127}, {0x705, 5}, {0x705, 5}, {0x705, 127}, {0x705, 5}}),
+            "; node 5 is operational");
+  EXPECT_EQ(
+      heard_about(5,
+                  {{0x705, 0}, {0x705, 127}, {0x705, 0}, {0x705, 127}, {0x705, 0}, {0x705, 127}, {0x705, 0}}),
+      "; node 5 is starting");
+  EXPECT_EQ(heard_about(5, {{0x705, 127}, {0x705, 5}, {0x705, 4}, {0x705, 127}, {0x705, 5}, {0x705, 4}}),
+            "; node 5 is stopped");
 }
 
 TEST(CanopenClient, AnswersToAMasterThatPollsLeaveAPushAlone) {
