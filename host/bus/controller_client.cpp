@@ -70,6 +70,10 @@ std::string describe(wire::Command command) {
 }
 
 std::string describe(wire::Answer answer, Refusal refusal, std::uint32_t detail) {
+  if (answer == wire::Answer::not_authorised && detail == wire::needs_signature)
+    return fmt::format("{}: it takes only signed commands", wire::text(answer));
+  if (answer == wire::Answer::not_authorised && detail == wire::needs_unlock)
+    return fmt::format("{}: an unlock has to come before", wire::text(answer));
   if (answer != wire::Answer::refused) return wire::text(answer);
   std::string why = text(refusal);
   switch (refusal) {

@@ -104,7 +104,9 @@ Bytes Push::authorised(ControllerClient& client, const MadeSet& made, const Sign
     }
   }
   refuse_beyond_capability(client, set, out);
-  if (unit && is_given(records.unit_hash)) result["serial"] = unit->serial;
+  // A controller need not tell more than the hash, which is equal.
+  if (unit && is_given(records.unit_hash))
+    result["serial"] = unit->serial.empty() ? made.serial : unit->serial;
   if (records.is_signed) {
     result["key_id"] = text(records.key_id);
     result["counter"] = records.counter;

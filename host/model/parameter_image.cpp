@@ -33,25 +33,50 @@ struct Collector {
   }
 };
 
-/// The header's word that these bytes are a whole image.
-void require_image(std::span<const std::uint8_t> image, const std::string& source) {
+/// Passes over what it is given.
+struct NoVisitor {
+  Refusal table(const Table&, const std::uint8_t*) { return Refusal::none; }
+  Refusal term(const Term<double>&) { return Refusal::none; }
+};
+
+/// Offsets of what the records of schema 1.1 hold in a well-formed image; 0: it has none.
+struct Offsets {
+  std::size_t unit = 0;
+  std::size_t signature = 0;
+};
+
+/// From record to record: the last bytes of a term or table may look like a signature.
+Offsets offsets_of(std::span<const std::uint8_t> image, const std::string& source) {
   ImageHeader header;
-  const Refusal refusal = read_header(image.data(), image.size(), header);
+  Refusal refusal = read_header(image.data(), image.size(), header);
+  ImageCursor cursor;
+  NoVisitor nothing;
+  Offsets out;
+  while (refusal == Refusal::none && !at_end(cursor, image.size())) {
+    const std::size_t at = cursor.at;
+    refusal = visit_record<double>(image.data(), image.size(), cursor, nothing);
+    if (refusal != Refusal::none) break;
+    const std::uint16_t type = load_u16(image.data() + at);
+    if (type == image::record_unit) out.unit = at + image::record_head_bytes;
+    if (type == image::record_signature) out.signature = at + image::record_head_bytes;
+  }
   if (refusal != Refusal::none)
     throw InputError(source, 0, "", "a parameter image", fmt::format("that {}", text(refusal)));
+  return out;
 }
 
 }  // namespace
 
 ImageRecords image_records(std::span<const std::uint8_t> image, const std::string& source) {
-  require_image(image, source);
+  const Offsets offsets = offsets_of(image, source);
   ImageRecords out;
-  if (const std::uint8_t* unit = bound_unit(image.data(), image.size()))
-    std::copy_n(unit, out.unit_hash.size(), out.unit_hash.begin());
-  if (const std::uint8_t* record = signature_of(image.data(), image.size())) {
+  if (offsets.unit != 0)
+    std::copy_n(image.subspan(offsets.unit).begin(), out.unit_hash.size(), out.unit_hash.begin());
+  if (offsets.signature != 0) {
+    const auto record = image.subspan(offsets.signature);
     out.is_signed = true;
-    out.counter = load_u64(record + signing::record_counter);
-    std::copy_n(record + signing::record_key_id, out.key_id.size(), out.key_id.begin());
+    out.counter = load_u64(record.data() + signing::record_counter);
+    std::copy_n(record.begin() + signing::record_key_id, out.key_id.size(), out.key_id.begin());
   }
   return out;
 }
@@ -59,12 +84,12 @@ ImageRecords image_records(std::span<const std::uint8_t> image, const std::strin
 std::vector<std::uint8_t> without_signature(std::span<const std::uint8_t> image, const std::string& source) {
   // Bytes 92 … 95 of the header (image.hpp): number of joints, from schema 1.1.
   constexpr std::size_t joints_at = 92;
-  require_image(image, source);
+  const Offsets offsets = offsets_of(image, source);
   std::vector<std::uint8_t> out(image.begin(), image.end());
-  if (signature_of(out.data(), out.size()) == nullptr) return out;
-  out.resize(out.size() - image::record_head_bytes - image::signature_bytes);
+  if (offsets.signature == 0) return out;
+  out.resize(offsets.signature - image::record_head_bytes + image::crc_bytes);
   // An image in which nothing of schema 1.1 is left is one of 1.0 (encode_image()).
-  if (bound_unit(out.data(), out.size()) == nullptr && out[joints_at] == 0) out[5] = 0;
+  if (offsets.unit == 0 && out[joints_at] == 0) out[5] = 0;
   store_u32(out.data() + 8, static_cast<std::uint32_t>(out.size()));
   const std::size_t crc_at = out.size() - image::crc_bytes;
   store_u32(out.data() + crc_at, crc32(out.data(), crc_at));

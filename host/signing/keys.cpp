@@ -60,12 +60,12 @@ struct Passphrase {
 int give_passphrase(char* to, int size, int for_writing, void* user) {
   auto& passphrase = *static_cast<Passphrase*>(user);
   passphrase.wanted = true;
-  if (const char* known = std::getenv(passphrase_variable)) {
-    const std::size_t length = std::strlen(known);
-    if (length > static_cast<std::size_t>(size)) return -1;
+  if (const char* variable = std::getenv(passphrase_variable)) {
+    const std::string_view known(variable);
+    if (known.size() > static_cast<std::size_t>(size)) return -1;
     passphrase.given = true;
-    std::memcpy(to, known, length);
-    return static_cast<int>(length);
+    std::copy(known.begin(), known.end(), to);
+    return static_cast<int>(known.size());
   }
   const int terminal = ::open("/dev/tty", O_RDWR | O_CLOEXEC | O_NOCTTY);
   if (terminal < 0) return -1;

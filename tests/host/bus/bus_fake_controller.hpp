@@ -121,6 +121,11 @@ struct Controller {
     return out;
   }
 
+  wire::Answer refuse_to_destroy() {
+    return answer(wire::Answer::not_authorised, Refusal::none,
+                  trusted.empty() ? wire::needs_unlock : wire::needs_signature);
+  }
+
   void activate(const Bytes& image) {
     active = image;
     status.active_slot = image.empty() ? wire::no_slot : std::uint16_t{0};
@@ -176,12 +181,12 @@ struct Controller {
       case wire::Command::rollback:
         if (previous.empty()) return answer(Answer::no_previous);
         if (status.state != static_cast<std::uint16_t>(wire::StoreState::trial) && !may_destroy(command))
-          return answer(Answer::not_authorised);
+          return refuse_to_destroy();
         staged = std::exchange(previous, {});
         activate(staged);
         return answer(Answer::accepted);
       case wire::Command::restore_defaults:
-        if (!may_destroy(command)) return answer(Answer::not_authorised);
+        if (!may_destroy(command)) return refuse_to_destroy();
         previous.clear();
         activate({});
         return answer(Answer::accepted);

@@ -172,6 +172,7 @@ TEST_P(ModbusClient, UnlocksWhatDestroysSets) {
   const auto client = server.client();
   const RefusedByController e = thrown<RefusedByController>([&] { roll_back(*client); });
   EXPECT_EQ(e.answer(), wire::Answer::not_authorised);
+  EXPECT_THAT(e.what(), HasSubstr("not authorised at the controller: an unlock has to come before"));
   EXPECT_THROW(erase(*client), RefusedByController);
   EXPECT_EQ(server.device.status.active_sequence, 7U);
   unlock(*client);

@@ -264,7 +264,7 @@ TEST_F(Authorised, RollbackUnlocksOrIsSigned) {
   const Said said = run("rollback --at {bus}");
   EXPECT_EQ(said.status, 4);
   EXPECT_THAT(said.text, HasSubstr("refused: "));
-  EXPECT_THAT(said.text, HasSubstr("not authorised at the controller"));
+  EXPECT_THAT(said.text, HasSubstr("not authorised at the controller: it takes only signed commands"));
   EXPECT_THAT(said.text,
               HasSubstr("it trusts one key (" + text(key_.id()) + "), and --key signs the command"));
   EXPECT_EQ(result()["outcome"], "refused");
