@@ -561,6 +561,10 @@ class Device {
     require(slot < 2, "an erase beyond the slots");
     if (d.is_dead_ || d.fails()) return FLEXCOMP_STORAGE_FAILED;
     if (d.is_busy()) return FLEXCOMP_STORAGE_BUSY;
+    if (!d.power_fails_within(FLEXCOMP_SLOT_BYTES)) {
+      d.flash_[slot].fill(0xFF);
+      return FLEXCOMP_STORAGE_DONE;
+    }
     for (std::size_t k = 0; k < d.flash_[slot].size(); ++k) {
       // Cut short, any of its bytes may be old or new: here every other one.
       if (d.power_goes()) return FLEXCOMP_STORAGE_FAILED;
@@ -592,6 +596,13 @@ class Device {
     if (busy_next_ == 0) return false;
     --busy_next_;
     return true;
+  }
+  /// False where so many bytes can be programmed or erased; they are counted then.
+  bool power_fails_within(std::uint32_t bytes) {
+    if (power_left_ < 0) return false;
+    if (power_left_ < static_cast<std::int64_t>(bytes)) return true;
+    power_left_ -= static_cast<std::int64_t>(bytes);
+    return false;
   }
   bool power_goes() {
     if (power_left_ < 0) return false;
