@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // flexcomp-controller: the firmware library as a Linux process. A thread of its own runs the control cycle,
 // as the timer interrupt of a controller would; the main thread serves the buses and the parameter store.
-#include <pthread.h>
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <time.h>
@@ -138,9 +137,6 @@ std::optional<Options> parse(const std::vector<std::string>& arguments) {
 /// Runs the control cycle: the joints oscillate slowly about the middle of their ranges, so that directions and
 /// published values change. Missed cycles are skipped, not caught up.
 void run_cycle(firmware::Device& device, std::uint32_t cycle_us, const std::atomic<bool>& stop) {
-  // Where the system allows it, ahead of everything else, as an interrupt would be.
-  const sched_param first{1};
-  ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &first);
   const auto context = default_context<firmware::Scalar>(device.robot());
   timespec next{};
   ::clock_gettime(CLOCK_MONOTONIC, &next);
