@@ -106,15 +106,21 @@ void operate(Device& device, Input& input) {
       if (what < 64) device.refuse_frames(what % 4);
       if (what >= 64 && what < 128) device.fail_storage(what % 4);
       if (what >= 128 && what < 192) device.busy_storage(what % 8);
-      if (what >= 192) device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
+      if (what >= 224) {
+        const std::uint32_t offset = input.u16();
+        device.spoil(what, offset, input.u8());
+      } else if (what >= 192)
+        device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
       break;
     }
-    default:
-      if ((input.u8() & 1U) == 0) {
-        device.power_on();
+    default: {
+      const unsigned what = input.u8();
+      if ((what & 1U) == 0) {
+        device.power_on(what / 2 % 16);
       } else {
         device.again_can();
       }
+    }
   }
   device.end_of_operation();
 }
@@ -219,6 +225,20 @@ std::vector<Bytes> seeds() {
                     .u8(0)
                     .out);
   all.push_back(Output().u8(0).u8(8).u8(1).u8(9).u8(9).u8(3).u8(16).u8(66).u8(11).u8(9).u8(7).out);
+  // A start whose readings fail, one more each time; a slot whose image, seals or marks have changed.
+  for (unsigned failing = 1; failing < 16; ++failing)
+    all.push_back(
+        Output().u8(2).u8(17).u8(2 * failing).u8(14).u8(3).u8(9).u8(6).u8(11).u8(17).u8(2 * failing).out);
+  for (unsigned slot = 0; slot < 2; ++slot) {
+    for (const unsigned offset : {0U, 100U, FLEXCOMP_SLOT_BYTES - 1U, FLEXCOMP_SLOT_BYTES - 33U,
+                                  FLEXCOMP_SLOT_BYTES - 70U, FLEXCOMP_SLOT_BYTES - 180U})
+      all.push_back(
+          Output().u8(2).u8(16).u8(224 + slot).u16(offset).u8(1).u8(14).u8(3).u8(9).u8(6).u8(11).out);
+  }
+  // Readings that fail in a rollback, after it was accepted; a set that costs too much.
+  for (unsigned failing = 1; failing < 4; ++failing)
+    all.push_back(Output().u8(2).u8(14).u8(3).u8(9).u8(6).u8(16).u8(64 + failing).u8(11).u8(14).u8(9).out);
+  all.push_back(Output().u8(0).u8(8).u8(6).u8(9).u8(2).u8(11).u8(9).u8(3).u8(11).out);
   // Probe, heartbeat, NMT, a transfer that is left, answers that are not taken.
   all.push_back(Output()
                     .u8(2)

@@ -67,9 +67,9 @@ inline Bytes image_of(const std::vector<FirmwareTerm>& terms, const std::vector<
   return out;
 }
 
-constexpr unsigned image_count = 6;
+constexpr unsigned image_count = 7;
 
-/// Sets that are admitted: empty, geometry, loads, a curve and a wave, a grid, a bit of all.
+/// Sets that are admitted: empty, geometry, loads, a curve and a wave, a grid, a bit of all; and one that costs too much.
 inline Bytes good_image(unsigned number, std::uint32_t sequence) {
   using flexcomp::Basis;
   std::vector<FirmwareTerm> terms;
@@ -130,6 +130,11 @@ inline Bytes good_image(unsigned number, std::uint32_t sequence) {
     table.size = 11;
     tables.push_back(table);
   }
+  if (number == 6) {
+    for (unsigned k = 0; k < 60; ++k)
+      add(1 + k % 6, k % 5, k % 2 == 0 ? Basis::sine : Basis::load_moment_x, k % 6, 1e-7).argument =
+          static_cast<FirmwareScalar>(1 + k / 6);
+  }
   return image_of(terms, tables, values, sequence);
 }
 
@@ -162,8 +167,8 @@ class Device {
 
   // --- power and flash ---------------------------------------------------------------------------------
 
-  /// Everything but the flash is lost.
-  void power_on() {
+  /// Everything but the flash is lost; so many hooks of the start fail.
+  void power_on(unsigned failing = 0) {
     is_dead_ = false;
     is_placed_ = false;
     power_left_ = -1;
@@ -182,7 +187,9 @@ class Device {
     require(arm_ != nullptr, "init refused a good robot");
     const flexcomp_hooks hooks{this, permit, log};
     if ((start_ & 16U) == 0) flexcomp_set_hooks(arm_, &hooks);
+    fail_next_ = failing;
     flexcomp_boot(arm_);
+    fail_next_ = 0;
     can_ = flexcomp_can_init(memory_.can.get(), FLEXCOMP_CAN_BYTES, arm_, node_id, 100, send_frame, this);
     rtu_ = flexcomp_rtu_init(memory_.rtu.get(), FLEXCOMP_RTU_BYTES, arm_, unit_id, 1750, send_rtu, this);
     require(can_ != nullptr && rtu_ != nullptr, "init of a bus failed");
@@ -192,6 +199,12 @@ class Device {
     }
     seen_crc_ = 0;
     check_active();
+  }
+  /// A byte of the flash has changed while the power was off.
+  void spoil(unsigned slot, std::uint32_t offset, unsigned by) {
+    std::uint8_t& byte = flash_[slot % 2][offset % FLEXCOMP_SLOT_BYTES];
+    byte = static_cast<std::uint8_t>(byte ^ by);
+    power_on();
   }
   /// The storage hooks fail, or are busy, so many times from now.
   void fail_storage(unsigned times) { fail_next_ = times; }
