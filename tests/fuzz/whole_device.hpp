@@ -354,6 +354,49 @@ class Device {
     }
     return answer.size() == 8 && (answer[0] & 0xEFU) == 0x20;
   }
+  /// Block download of an object (CiA 301, 7.2.4.3.9); `wrong` changes its CRC.
+  void block_download(unsigned index, unsigned sub, const Bytes& bytes, unsigned wrong) {
+    Bytes answer =
+        sdo(Output().u8(0xC6).u16(index).u8(sub).u32(static_cast<std::uint32_t>(bytes.size())).out);
+    unsigned crc = wrong;
+    for (const unsigned byte : bytes) {
+      crc ^= byte << 8U;
+      for (int k = 0; k < 8; ++k)
+        crc = (crc & 0x8000U) != 0 ? (crc << 1U ^ 0x1021U) & 0xFFFFU : crc << 1U & 0xFFFFU;
+    }
+    std::size_t at = 0;
+    while (at < bytes.size()) {
+      if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xA0) return;
+      const unsigned most = answer[0] == 0xA2 ? answer[2] : answer[4];
+      for (unsigned number = 1; number <= most && at < bytes.size(); ++number, at += 7) {
+        const std::size_t n = std::min<std::size_t>(7, bytes.size() - at);
+        const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+        answer = sdo(Output()
+                         .u8(number | (at + n == bytes.size() ? 0x80U : 0U))
+                         .add(Bytes(from, from + static_cast<std::ptrdiff_t>(n)))
+                         .out);
+      }
+    }
+    if (answer.size() == 8 && answer[0] == 0xA2)
+      sdo(Output().u8(0xC1U | static_cast<unsigned>(at - bytes.size()) << 2U).u16(crc).out);
+  }
+  /// Block upload of an object, of which all but so many segments of a sub-block are said to have arrived.
+  void block_upload(unsigned index, unsigned sub, unsigned most, unsigned lost) {
+    Bytes answer = sdo(Output().u8(0xA4).u16(index).u8(sub).u8(most).u8(0).out);
+    if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xC0) return;
+    answer = sdo({0xA3});
+    for (int blocks = 0; blocks < 40; ++blocks) {
+      for (int k = 0; k < 4; ++k) can_poll(1);
+      if (answer_.size() != 8) return;
+      const unsigned number = answer_[0] & 0x7FU;
+      answer = sdo(Output().u8(0xA2).u8(number > lost ? number - lost : 0).u8(most).out);
+      if (answer.size() == 8 && (answer[0] & 0xE3U) == 0xC1) {
+        sdo({0xA1});
+        return;
+      }
+      lost = 0;
+    }
+  }
   /// Upload of an object, at most so many segments of it.
   void upload(unsigned index, unsigned sub, unsigned most) {
     Bytes answer = sdo(Output().u8(0x40).u16(index).u8(sub).out);

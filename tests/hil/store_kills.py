@@ -18,7 +18,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from buses import CALIBRATION, TCP_UNIT, check, modbus_request, read, write  # noqa: E402
 from disturbed_buses import Bench  # noqa: E402
 
-RESTORE = 8
+TRIAL, RESTORE = 4, 8  # a state, a command
 # The client waits for the controller that is started again.
 PATIENT = 5
 
@@ -38,7 +38,7 @@ class Killer(threading.Thread):
 
     def run(self):
         if self.at_change:
-            end = time.monotonic() + 0.2
+            end = time.monotonic() + PATIENT
             first = os.stat(self.path).st_mtime_ns
             while os.stat(self.path).st_mtime_ns == first and time.monotonic() < end and not self.is_over.is_set():
                 time.sleep(0.0001)
@@ -91,20 +91,28 @@ def one_kill(bench, k, held, counts):
     killer.is_over.set()
     killer.join()
     now, image = bench.judge()
-    # What runs where the command has taken effect; a restart ends a trial.
-    after = {"trial": permanent_image, "end trial": permanent_image, "rollback": previous_image, "restore": b""}.get(what)
-    if after is None:
-        after = read(sent) if os.path.exists(sent) else permanent_image
-    whole = image in (permanent_image, after)
-    durable = word != "active" or image == after
+    sent_image = read(sent) if os.path.exists(sent) else permanent_image
+    # What runs where the command has taken effect; a restart ends a trial, so after one a rollback is that of the permanent set.
+    after = {"push": [sent_image], "confirm": [sent_image], "trial": [permanent_image],
+             "end trial": [permanent_image, previous_image], "rollback": [previous_image], "restore": [b""]}[what]
+    on_trial_again = what == "trial" and now["state"] == TRIAL  # pushed to the controller that was started again
+    if on_trial_again:
+        after = [sent_image]
+    whole = image == permanent_image or image in after
+    durable = word != "active" or image in after
     # A plain restart.
     with bench.lock:
         bench.close()
         bench.start()
     again, image_again = bench.judge()
     stays = (again["sequence"], again["crc"], again["previous"], image_again) == (
-        now["sequence"], now["crc"], now["previous"], image) and again["state"] == now["state"] == 0
-    cut = killer.left not in (store_before, read(f"{work}/store.bin")) or (killer.left != store_before and image == permanent_image)
+        now["sequence"], now["crc"], now["previous"], image) and now["state"] == 0
+    if on_trial_again:
+        stays = image_again == permanent_image
+    stays = stays and again["state"] == 0
+    # The start mended what the kill had left, or what was begun is not there.
+    cut = killer.left not in (store_before, read(f"{work}/store.bin"))
+    cut = cut or (killer.left != store_before and image == permanent_image)
     counts["kills"] += 1
     counts["cut while writing"] += cut
     counts["set before"] += image == permanent_image
