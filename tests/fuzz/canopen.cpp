@@ -139,7 +139,8 @@ void operate(Device& device, Input& input) {
 
 void run(Input input) {
   Device device(input.u8());
-  device.can_poll(1);  // boot-up: before it there is no SDO; operation 19 makes a node that has not spoken yet
+  device.can_poll(
+      1);  // boot-up: before it there is no SDO; operation 19 makes a node that has not spoken yet
   for (unsigned k = 0; k < 64 && !input.is_empty(); ++k) operate(device, input);
   device.check_active();
 }
