@@ -256,7 +256,8 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
       r = check_crc_ != load_u32(image + end) ? Refusal::checksum
                                               : check_binding(header_, nominal_hash_, robot_.name_hash);
       if (r == Refusal::none) r = check_unit(image, check_bytes_, robot_.unit_hash);
-      if (r != Refusal::none || (check_signature_ != nullptr && check_signature_(*this, true, r))) return true;
+      if (r != Refusal::none || (check_signature_ != nullptr && check_signature_(*this, true, r)))
+        return true;
       begin_model(robot_, model);
       cursor_ = {};
       check_ = check_signature_ != nullptr ? Check::signature : Check::records;
@@ -403,7 +404,7 @@ void Store::checked(Refusal r, std::uint32_t detail) {
     return;
   }
   if (is_command_ && r == Refusal::none) {
-    permission_ = {owner_, static_cast<Command>(load_u16(staging_.data() + signing::command_number)), 0,
+    permission_ = {owner_, static_cast<Command>(load_u16(staging_.data() + signing::command_number)), 0, true,
                    now_ms_};
     slots_.note_counter(check_counter_);
     finish(Answer::accepted);
@@ -650,19 +651,21 @@ Answer Store::unlock(std::uint32_t argument, Origin origin) {
     const std::uint32_t seed[2] = {++challenges_, now_ms_};
     std::uint8_t bytes[sizeof seed];
     std::memcpy(bytes, seed, sizeof seed);
-    permission_ = {origin, Command::none, crc32(bytes, sizeof bytes) | 1U, now_ms_};
+    permission_ = {origin, Command::none, crc32(bytes, sizeof bytes) | 1U, false, now_ms_};
     return answer(Answer::accepted, permission_.challenge);
   }
-  const bool is_right = permission_.origin == origin && permission_.challenge == argument;
-  permission_.challenge = 0;
-  if (is_right) return answer(Answer::accepted);
+  // The answer may be lost: the right number may come again.
+  if (permission_.origin == origin && permission_.challenge == argument) {
+    permission_.is_given = true;
+    return answer(Answer::accepted);
+  }
   permission_ = Permission{};
   return answer(Answer::not_authorised, wire::needs_unlock);
 }
 
 /// Whether a client may run a command that destroys sets.
 bool Store::has_permission(Command command, Origin origin) const {
-  return permission_.origin == origin && permission_.challenge == 0 &&
+  return permission_.origin == origin && permission_.is_given &&
          now_ms_ - permission_.since_ms < permission_ms &&
          (permission_.command == command || (permission_.command == Command::none && trust_.count == 0));
 }

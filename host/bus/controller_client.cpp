@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <thread>
 
@@ -140,6 +141,11 @@ std::optional<Robot> ControllerClient::robot() {
   out.path = fmt::format("the controller at {}", where_);
   out.name.assign(name.data(), size);
   out.nominal.name_hash = capability_.name_hash;
+  // The hash says nothing of limits, tool and payload.
+  wire::detail::visit_robot(out.nominal, [this](double v) {
+    if (!std::isfinite(v))
+      throw BusError(where_, "the robot that the controller tells has a number that is not finite");
+  });
   if (nominal_hash(out.nominal) != capability_.nominal_hash ||
       (size != 0 && name_hash(name.data(), size) != capability_.name_hash)) {
     throw BusError(

@@ -64,6 +64,13 @@ class FirstNode : public YAML::EventHandler {
   YAML::Mark mark_ = YAML::Mark::null_mark();
 };
 
+/// Whether the text is the same when it is written and read again: YAML has U+FFFD for bytes that are not UTF-8, and for the code
+/// points that stand for no character.
+bool can_be_written(const std::string& text) {
+  const bool is_plain = std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return is_plain || YAML::Load(yaml_quoted(text)).Scalar() == text;
+}
+
 }  // namespace
 
 YamlField::YamlField(const YAML::Node& node, std::string file, std::string path, std::size_t line)
@@ -152,6 +159,7 @@ std::vector<YamlField> YamlField::items() const {
 
 std::string YamlField::text() const {
   if (!node_.IsScalar() || node_.Scalar().empty()) throw error("a name or text");
+  if (!can_be_written(node_.Scalar())) throw error("text in UTF-8", "other bytes");
   return node_.Scalar();
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// SHA-256 (FIPS 180-4) without a heap, for the nominal hash. Not for signatures: the host uses OpenSSL.
+/// SHA-256 (FIPS 180-4) without a heap: of the nominal geometry, names, serial numbers, and of what is signed.
 #ifndef FLEXCOMP_SHA256_HPP
 #define FLEXCOMP_SHA256_HPP
 

@@ -440,6 +440,9 @@ TEST(Unlock, NoSingleFrameDestroysASet) {
     EXPECT_EQ(store.run(c, 0, 1), Answer::not_authorised) << "a command in between";
   }
   EXPECT_NE(challenge(1), challenge(1)) << "what was recorded does not open";
+  const std::uint32_t twice = challenge(1);
+  EXPECT_EQ(store.run(Command::unlock, twice, 1), Answer::accepted);
+  EXPECT_EQ(store.run(Command::unlock, twice, 1), Answer::accepted) << "its answer was lost";
   EXPECT_EQ(arm.sequence(), 2U);
   ASSERT_EQ(store.run(Command::unlock, challenge(1), 1), Answer::accepted);
   EXPECT_EQ(store.run(Command::rollback, 0, 1), Answer::accepted);

@@ -13,6 +13,27 @@ namespace {
 
 using namespace flexcomp::host;
 
+/// As `identify` writes it: with standard deviations, the geometry's hash, the date, the covariance and what was not told apart.
+std::string identified() {
+  Calibration c =
+      load_calibration(path_of(file_of("tests/data/tx60l_table1.yaml") +
+                               "  - {effect: joint_curve, joint: 1, coefficients_rad: [0, 1.0e-4, 0, "
+                               "-1.0e-4, 0, 0], sigma_coefficients_rad: [1e-6, 2e-6, 0, 0, 0, 0]}\n"),
+                       tx60l());
+  stamp(c, tx60l());
+  c.date = "2026-03-01T12:30:05Z";
+  c.sequence = 7;
+  c.sigma.assign(c.terms.terms.size(), 1e-6);
+  CovarianceFactor covariance;
+  covariance.parameters = {"link1.theta", "link2.theta"};
+  covariance.factor = Eigen::MatrixXd::Identity(2, 2) * 1e-6;
+  c.covariance = covariance;
+  c.confounded.push_back({"base.rz", {"link1.theta"}});
+  c.at_bound.push_back({"joint_compliance[2]", 1e-7});
+  c.residuals = {{"after_mean_mm", 0.05}};
+  return calibration_text(c, tx60l());
+}
+
 /// What makes each term, in an order that does not depend on that of the links in the file.
 auto sorted(const std::vector<flexcomp::Term<double>>& terms) {
   std::vector<std::tuple<unsigned, unsigned, unsigned, unsigned, unsigned, double, double>> all;
@@ -65,6 +86,7 @@ std::vector<Bytes> seeds() {
                "values_rad: [[0, 1], [2, 0]]}\n"
                "  - {effect: thermal_growth, link: 4, per_k: 1.0e-6}\n"
                "frames: {f: {xyz_mm: [1, 2, 3], quaternion_wxyz: [1, 0, 0, 0]}, e: {xyz_mm: [1, 2, 3]}}\n"));
+  all.push_back(bytes_of(identified()));
   // Every example of the list of effects.
   const std::string page = file_of("docs/effects.md");
   std::string effects = "effects:\n";

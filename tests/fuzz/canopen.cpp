@@ -28,7 +28,7 @@ Object object(Input& input) {
   return {objects[k % object_count][0], objects[k % object_count][1]};
 }
 
-constexpr unsigned operations = 18;
+constexpr unsigned operations = 20;
 
 void operate(Device& device, Input& input) {
   switch (input.u8() % operations) {
@@ -106,21 +106,41 @@ void operate(Device& device, Input& input) {
       if (what < 64) device.refuse_frames(what % 4);
       if (what >= 64 && what < 128) device.fail_storage(what % 4);
       if (what >= 128 && what < 192) device.busy_storage(what % 8);
-      if (what >= 192) device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
+      if (what >= 192 && what < 224) device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
+      if (what >= 224) {
+        const std::uint32_t offset = input.u16();
+        device.spoil(what, offset, input.u8());
+      }
       break;
     }
-    default:
-      if ((input.u8() & 1U) == 0) {
-        device.power_on();
+    case 17: {  // a good image in blocks, or other bytes
+      const unsigned which = input.u8();
+      const Bytes image = which < 128 ? good_image(which, input.u8()) : input.bytes(which);
+      device.block_download(0x2010, 1, image, input.u8());
+      break;
+    }
+    case 18: {
+      const Object o = object(input);
+      const unsigned most = input.u8();
+      device.block_upload(o.index, o.sub, most, input.u8());
+      break;
+    }
+    default: {
+      const unsigned what = input.u8();
+      if ((what & 1U) == 0) {
+        device.power_on(what / 2 % 16);
       } else {
         device.again_can();
       }
+    }
   }
   device.end_of_operation();
 }
 
 void run(Input input) {
   Device device(input.u8());
+  device.can_poll(
+      1);  // boot-up: before it there is no SDO; operation 19 makes a node that has not spoken yet
   for (unsigned k = 0; k < 64 && !input.is_empty(); ++k) operate(device, input);
   device.check_active();
 }
@@ -197,11 +217,11 @@ std::vector<Bytes> seeds() {
                     .u8(23)
                     .u8(13)
                     .u16(1)
-                    .u8(17)
+                    .u8(19)
                     .u8(0)
                     .out);
   all.push_back(
-      Output().u8(2).u8(14).u8(3).u8(9).u8(6).u8(11).u8(14).u8(9).u8(10).u8(1).u8(1).u8(11).u8(17).u8(0).out);
+      Output().u8(2).u8(14).u8(3).u8(9).u8(6).u8(11).u8(14).u8(9).u8(10).u8(1).u8(1).u8(11).u8(19).u8(0).out);
   all.push_back(Output()
                     .u8(0)
                     .u8(8)
@@ -215,10 +235,49 @@ std::vector<Bytes> seeds() {
                     .u16(13000)
                     .u8(11)
                     .u8(11)
-                    .u8(17)
+                    .u8(19)
                     .u8(0)
                     .out);
   all.push_back(Output().u8(0).u8(8).u8(1).u8(9).u8(9).u8(3).u8(16).u8(66).u8(11).u8(9).u8(7).out);
+  // A start whose readings fail, one more each time; a slot whose image, seals or marks have changed.
+  for (unsigned failing = 1; failing < 16; ++failing)
+    all.push_back(
+        Output().u8(2).u8(19).u8(2 * failing).u8(14).u8(3).u8(9).u8(6).u8(11).u8(19).u8(2 * failing).out);
+  for (unsigned slot = 0; slot < 2; ++slot) {
+    for (const unsigned offset : {0U, 100U, FLEXCOMP_SLOT_BYTES - 1U, FLEXCOMP_SLOT_BYTES - 33U,
+                                  FLEXCOMP_SLOT_BYTES - 70U, FLEXCOMP_SLOT_BYTES - 180U})
+      all.push_back(
+          Output().u8(2).u8(16).u8(224 + slot).u16(offset).u8(1).u8(14).u8(3).u8(9).u8(6).u8(11).out);
+  }
+  // Readings that fail in a rollback, after it was accepted; a set that costs too much.
+  for (unsigned failing = 1; failing < 4; ++failing)
+    all.push_back(Output().u8(2).u8(14).u8(3).u8(9).u8(6).u8(16).u8(64 + failing).u8(11).u8(14).u8(9).out);
+  all.push_back(Output().u8(0).u8(8).u8(6).u8(9).u8(2).u8(11).u8(9).u8(3).u8(11).out);
+  // In blocks, whole, with a wrong CRC, with segments that got lost; after a pause.
+  for (unsigned image = 0; image < 6; ++image)
+    all.push_back(Output()
+                      .u8(0)
+                      .u8(17)
+                      .u8(image)
+                      .u8(9)
+                      .u8(image == 4 ? 1 : 0)
+                      .u8(9)
+                      .u8(2)
+                      .u8(11)
+                      .u8(9)
+                      .u8(3)
+                      .u8(11)
+                      .u8(14)
+                      .u8(3)
+                      .u8(18)
+                      .u8(25)
+                      .u8(127)
+                      .u8(0)
+                      .out);
+  for (unsigned k = 0; k < object_count; ++k)
+    all.push_back(
+        Output().u8(2).u8(14).u8(3).u8(18).u8(k).u8(k % 3 == 0 ? 5 : 127).u8(k % 4).u8(12).u16(3000).out);
+  all.push_back(Output().u8(0).u8(17).u8(140).add(Bytes(140, 5)).u8(0).out);
   // Probe, heartbeat, NMT, a transfer that is left, answers that are not taken.
   all.push_back(Output()
                     .u8(2)

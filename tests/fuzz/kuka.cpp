@@ -58,12 +58,16 @@ std::vector<Bytes> seeds() {
   const std::string left = "PTP " + axes + "\nXP[1]=" + pose + "\nS={P " + pose +
                            ",V 2}\n$AXIS_HOME[1]=" + axes + "\nDECL FRAME F=G:" + pose + "\n$TOOL=" + pose +
                            "\n";
-  return {with_options({0}, many),
-          with_options({1}, "PTP " + axes + "\n"),
+  return {with_options({0}, many), with_options({1}, "PTP " + axes + "\n"),
           with_options({1}, "LIN " + pose + "\n"),
           with_options({1}, "DECL E6POS XP7={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 35,E1 0,E2 0}\nLIN XP7\n"),
-          with_options({0}, left),
-          with_options({0}, "LIN_REL {X 5}\nLIN P1:" + pose + "\n")};
+          // Turns that the corrected joints change, in each spelling.
+          with_options({1}, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 'B100011'}\nLIN XP1\n"),
+          with_options({1}, "XP1={X 500,Y 0,Z 600,A 10,B 80,C 5,S 2,T 'H23'}\nLIN XP1\n"),
+          with_options({1},
+                       "XP1={X 500,Y 0.01,Z 600,A 0,B 90,C 0,T 0}\nLIN XP1\nXP2={X 500,Y -0.01,Z 600,A 0,B "
+                       "90,C 0,T 1}\nLIN XP2\n"),
+          with_options({0}, left), with_options({0}, "LIN_REL {X 5}\nLIN P1:" + pose + "\n")};
 }
 
 const Register registered({"kuka", run, seeds, mutate_words<words>});

@@ -56,6 +56,10 @@ std::vector<Bytes> seeds() {
                             ",v1000,fine,tool0\\WObj:=w;\nTriggL p,v1,tr,z1,t; ! " + joints +
                             "\nSearchL\\Stop,di,s,p,v1,t;\nENDPROC\nENDMODULE\n"),
       with_options({1}, "MoveAbsJ " + joints + ",v1,z1,t;\n"),
+      // Among the ways to a pose cfx chooses.
+      with_options({1}, "MoveL [[400,100,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n"),
+      with_options({1}, "MoveL [[400,100,500],[0,0,1,0],[0,0,0,1],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n"),
+      with_options({1}, "MoveL [[400,100,300],[0,0.6,0.8,0],[0,0,0,2],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n"),
       with_options({1}, "MoveL [[400,100,500],[0,0,1,0],[0,-1,0,1],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n"),
       with_options({1}, "CONST robtarget p:=" + point +
                             ";\nMoveC p,p,v1,z1,t;\nMoveL Offs(q,0,0,1),v1,z1,t;\nPDispOn p,t;\n"),

@@ -67,9 +67,9 @@ inline Bytes image_of(const std::vector<FirmwareTerm>& terms, const std::vector<
   return out;
 }
 
-constexpr unsigned image_count = 6;
+constexpr unsigned image_count = 7;
 
-/// Sets that are admitted: empty, geometry, loads, a curve and a wave, a grid, a bit of all.
+/// Sets that are admitted: empty, geometry, loads, a curve and a wave, a grid, a bit of all; and one that costs too much.
 inline Bytes good_image(unsigned number, std::uint32_t sequence) {
   using flexcomp::Basis;
   std::vector<FirmwareTerm> terms;
@@ -130,6 +130,11 @@ inline Bytes good_image(unsigned number, std::uint32_t sequence) {
     table.size = 11;
     tables.push_back(table);
   }
+  if (number == 6) {
+    for (unsigned k = 0; k < 60; ++k)
+      add(1 + k % 6, k % 5, k % 2 == 0 ? Basis::sine : Basis::load_moment_x, k % 6, 1e-7).argument =
+          static_cast<FirmwareScalar>(1 + k / 6);
+  }
   return image_of(terms, tables, values, sequence);
 }
 
@@ -162,8 +167,8 @@ class Device {
 
   // --- power and flash ---------------------------------------------------------------------------------
 
-  /// Everything but the flash is lost.
-  void power_on() {
+  /// Everything but the flash is lost; so many hooks of the start fail.
+  void power_on(unsigned failing = 0) {
     is_dead_ = false;
     is_placed_ = false;
     power_left_ = -1;
@@ -182,7 +187,9 @@ class Device {
     require(arm_ != nullptr, "init refused a good robot");
     const flexcomp_hooks hooks{this, permit, log};
     if ((start_ & 16U) == 0) flexcomp_set_hooks(arm_, &hooks);
+    fail_next_ = failing;
     flexcomp_boot(arm_);
+    fail_next_ = 0;
     can_ = flexcomp_can_init(memory_.can.get(), FLEXCOMP_CAN_BYTES, arm_, node_id, 100, send_frame, this);
     rtu_ = flexcomp_rtu_init(memory_.rtu.get(), FLEXCOMP_RTU_BYTES, arm_, unit_id, 1750, send_rtu, this);
     require(can_ != nullptr && rtu_ != nullptr, "init of a bus failed");
@@ -192,6 +199,12 @@ class Device {
     }
     seen_crc_ = 0;
     check_active();
+  }
+  /// A byte of the flash has changed while the power was off.
+  void spoil(unsigned slot, std::uint32_t offset, unsigned by) {
+    std::uint8_t& byte = flash_[slot % 2][offset % FLEXCOMP_SLOT_BYTES];
+    byte = static_cast<std::uint8_t>(byte ^ by);
+    power_on();
   }
   /// The storage hooks fail, or are busy, so many times from now.
   void fail_storage(unsigned times) { fail_next_ = times; }
@@ -340,6 +353,49 @@ class Device {
       at += n;
     }
     return answer.size() == 8 && (answer[0] & 0xEFU) == 0x20;
+  }
+  /// Block download of an object (CiA 301, 7.2.4.3.9); `wrong` changes its CRC.
+  void block_download(unsigned index, unsigned sub, const Bytes& bytes, unsigned wrong) {
+    Bytes answer =
+        sdo(Output().u8(0xC6).u16(index).u8(sub).u32(static_cast<std::uint32_t>(bytes.size())).out);
+    unsigned crc = wrong;
+    for (const unsigned byte : bytes) {
+      crc ^= byte << 8U;
+      for (int k = 0; k < 8; ++k)
+        crc = (crc & 0x8000U) != 0 ? (crc << 1U ^ 0x1021U) & 0xFFFFU : crc << 1U & 0xFFFFU;
+    }
+    std::size_t at = 0;
+    while (at < bytes.size()) {
+      if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xA0) return;
+      const unsigned most = answer[0] == 0xA2 ? answer[2] : answer[4];
+      for (unsigned number = 1; number <= most && at < bytes.size(); ++number, at += 7) {
+        const std::size_t n = std::min<std::size_t>(7, bytes.size() - at);
+        const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+        answer = sdo(Output()
+                         .u8(number | (at + n == bytes.size() ? 0x80U : 0U))
+                         .add(Bytes(from, from + static_cast<std::ptrdiff_t>(n)))
+                         .out);
+      }
+    }
+    if (answer.size() == 8 && answer[0] == 0xA2)
+      sdo(Output().u8(0xC1U | static_cast<unsigned>(at - bytes.size()) << 2U).u16(crc).out);
+  }
+  /// Block upload of an object, of which all but so many segments of a sub-block are said to have arrived.
+  void block_upload(unsigned index, unsigned sub, unsigned most, unsigned lost) {
+    Bytes answer = sdo(Output().u8(0xA4).u16(index).u8(sub).u8(most).u8(0).out);
+    if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xC0) return;
+    answer = sdo({0xA3});
+    for (int blocks = 0; blocks < 40; ++blocks) {
+      for (int k = 0; k < 4; ++k) can_poll(1);
+      if (answer_.size() != 8) return;
+      const unsigned number = answer_[0] & 0x7FU;
+      answer = sdo(Output().u8(0xA2).u8(number > lost ? number - lost : 0).u8(most).out);
+      if (answer.size() == 8 && (answer[0] & 0xE3U) == 0xC1) {
+        sdo({0xA1});
+        return;
+      }
+      lost = 0;
+    }
   }
   /// Upload of an object, at most so many segments of it.
   void upload(unsigned index, unsigned sub, unsigned most) {
@@ -561,6 +617,10 @@ class Device {
     require(slot < 2, "an erase beyond the slots");
     if (d.is_dead_ || d.fails()) return FLEXCOMP_STORAGE_FAILED;
     if (d.is_busy()) return FLEXCOMP_STORAGE_BUSY;
+    if (!d.power_fails_within(FLEXCOMP_SLOT_BYTES)) {
+      d.flash_[slot].fill(0xFF);
+      return FLEXCOMP_STORAGE_DONE;
+    }
     for (std::size_t k = 0; k < d.flash_[slot].size(); ++k) {
       // Cut short, any of its bytes may be old or new: here every other one.
       if (d.power_goes()) return FLEXCOMP_STORAGE_FAILED;
@@ -592,6 +652,13 @@ class Device {
     if (busy_next_ == 0) return false;
     --busy_next_;
     return true;
+  }
+  /// False where so many bytes can be programmed or erased; they are counted then.
+  bool power_fails_within(std::uint32_t bytes) {
+    if (power_left_ < 0) return false;
+    if (power_left_ < static_cast<std::int64_t>(bytes)) return true;
+    power_left_ -= static_cast<std::int64_t>(bytes);
+    return false;
   }
   bool power_goes() {
     if (power_left_ < 0) return false;

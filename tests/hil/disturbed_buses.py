@@ -58,8 +58,12 @@ class Judge:
                 raise RuntimeError("the controller cannot be judged")
 
     @staticmethod
+    def raw_status(sock):
+        return modbus_request(sock, TCP_UNIT, struct.pack(">BHH", 3, 0x0040, 48))[2:]
+
+    @staticmethod
     def status(sock):
-        record = modbus_request(sock, TCP_UNIT, struct.pack(">BHH", 3, 0x0040, 48))[2:]
+        record = Judge.raw_status(sock)
         state, slot = struct.unpack_from(">H", record, 0)[0], struct.unpack_from(">H", record, 12)[0]
         sequence, size, crc, previous = struct.unpack_from(">IIII", record, 16)
         return {"state": state, "slot": slot, "sequence": sequence, "bytes": size, "crc": crc, "previous": previous}
@@ -195,8 +199,8 @@ class Line:
 
 
 class Bench:
-    def __init__(self, work, channel, rng):
-        self.work, self.channel, self.rng = work, channel, rng
+    def __init__(self, work, channel, rng, *options):
+        self.work, self.channel, self.rng, self.options = work, channel, rng, options
         with socket.create_server(("127.0.0.1", 0)) as server:
             self.port = server.getsockname()[1]
         self.judge = Judge(self.port)
@@ -215,7 +219,7 @@ class Bench:
     def start(self):
         self.controller = subprocess.Popen(
             [CONTROLLER, "--robot", f"{SOURCE}/host/robots/tx60l.yaml", "--store", f"{self.work}/store.bin",
-             "--modbus-tcp", f"127.0.0.1:{self.port}:{TCP_UNIT}", "--modbus-rtu", f"{self.line.far}:{BAUD}:N:{RTU_UNIT}"],
+             "--modbus-tcp", f"127.0.0.1:{self.port}:{TCP_UNIT}", "--modbus-rtu", f"{self.line.far}:{BAUD}:N:{RTU_UNIT}", *self.options],
             stdout=subprocess.PIPE, text=True)
         ready = self.controller.stdout.readline()
         assert ready.startswith("ready "), ready

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The client and the firmware over a CAN channel that loses, doubles, delays and reorders frames, with another master on it,
-// and controllers and clients that are killed in the middle. Every push ends in a word that is true when it is judged by
-// the controller itself, and the controller has a whole set.
+// and controllers and clients that are killed in the middle. Every push, confirm and rollback ends in a word that is true when
+// it is judged by the controller itself, and the controller has a whole set.
 //
 //   FLEXCOMP_TRANSFERS=2000 hil_tests --file disturbed_can_test.cpp     the long run; its table is in docs/buses.md
 #include <gtest/gtest.h>
@@ -21,6 +21,7 @@
 #include <mutex>
 #include <random>
 #include <thread>
+#include <tuple>
 
 #include "bus/transfer.hpp"
 #include "firmware/bench.hpp"
@@ -37,6 +38,7 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr std::uint8_t node_id = 5;
+constexpr std::uint32_t trial_cycles = 20000;  ///< longer than the longest confirm
 
 /// What the channel does to a frame, either way.
 struct Disturbance {
@@ -46,9 +48,9 @@ struct Disturbance {
   double delayed = 0;           ///< by up to 20 ms; others pass them
   milliseconds poll{0};         ///< another master reads 1001h so often
   bool full_load = false;       ///< foreign frames without end, on this channel and others
-  double kills_controller = 0;  ///< in so many pushes
+  double kills_controller = 0;  ///< in so many transfers
   double kills_client = 0;
-  bool exact = false;  ///< 99 % of the pushes have to end active
+  bool exact = false;  ///< 99 % of the transfers have to end active
 };
 
 const std::array disturbances = std::to_array<Disturbance>({
@@ -117,6 +119,10 @@ class DisturbedController {
   void disturb() {
     const std::lock_guard<std::mutex> lock(mutex_);
     is_calm_ = false;
+  }
+  unsigned kills() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return kills_;
   }
   template <class Look>
   auto look(const Look& l) {
@@ -205,6 +211,7 @@ class DisturbedController {
     }
     if (kill_at_ && now >= *kill_at_) {
       kill_at_.reset();
+      ++kills_;
       node_.reset();
       arm_.reset();
       back_at_ = now + gone_for_;
@@ -228,6 +235,7 @@ class DisturbedController {
   steady_clock::time_point next_poll_, next_ms_, back_at_;
   std::optional<steady_clock::time_point> kill_at_;
   milliseconds gone_for_{0};
+  unsigned kills_ = 0;
   bool is_calm_ = false;
   std::mutex mutex_;
   std::atomic<bool> stop_{false};
@@ -249,22 +257,84 @@ struct Count {
   double seconds = 0, longest_s = 0;
 };
 
-Count push_over(const Disturbance& what, int times, std::uint32_t seed) {
+/// What is done over the channel: seven in ten are pushes, the others pushes on trial, confirms and rollbacks.
+enum class Transfer { push, trial, confirm, rollback };
+
+Transfer draw_transfer(const wire::Status& before, double draw) {
+  if (before.state == static_cast<std::uint16_t>(wire::StoreState::trial))
+    return draw < 0.6 ? Transfer::confirm : Transfer::rollback;
+  if (before.previous_sequence != 0 && draw < 0.12) return Transfer::rollback;
+  return draw < 0.3 ? Transfer::trial : Transfer::push;
+}
+
+/// The controller's sets, as the judge sees them.
+struct Held {
+  wire::Status status;
+  Bytes active;
+  Bytes permanent;  ///< a restart runs it: the active one, but for a set on trial
+  Bytes previous;   ///< rollback returns to it
+  bool on_trial() const { return status.state == static_cast<std::uint16_t>(wire::StoreState::trial); }
+};
+
+/// What became of a transfer that was begun with `before`, and the sets after it. `is_active` is what the word active says;
+/// `is_whole`: one of the sets that may run now does, byte for byte.
+struct Judged {
+  Held now;
+  bool is_active = false;
+  bool is_whole = false;
+};
+Judged judge(DisturbedController& far, const Held& before, Transfer what, const Bytes& image,
+             unsigned kills) {
+  Judged out;
+  Held& now = out.now;
+  std::tie(now.status, now.active) =
+      far.look([](bench::Arm& arm) { return std::pair(arm.device->status(), arm.pull()); });
+  const bool is_sent = host::identity(image).is_active(now.status) && now.active == image;
+  // A restart ends a trial.
+  const bool may_have_reverted = kills != 0 && before.on_trial();
+  switch (what) {
+    case Transfer::push:
+    case Transfer::trial:
+      out.is_active = is_sent && (what == Transfer::trial) == now.on_trial();
+      out.is_whole = is_sent || now.active == before.active;
+      break;
+    case Transfer::confirm:
+      out.is_active = now.active == before.active && !now.on_trial();
+      out.is_whole = now.active == before.active || (may_have_reverted && now.active == before.permanent);
+      break;
+    case Transfer::rollback: {
+      const Bytes& other = before.on_trial() ? before.permanent : before.previous;
+      out.is_active = now.active == other && !now.on_trial();
+      out.is_whole = out.is_active || now.active == before.active;
+      break;
+    }
+  }
+  now.permanent = now.on_trial() ? before.permanent : now.active;
+  now.previous = now.permanent == before.permanent ? before.previous : before.permanent;
+  if (now.status.previous_sequence == 0) now.previous.clear();
+  return out;
+}
+
+Count transfers_over(const Disturbance& what, int times, std::uint32_t seed) {
   Count out;
   DisturbedController far(what, seed);
   std::mt19937 random(seed + 1);
-  const auto chance = [&random](double share) {
-    return share > 0 && std::uniform_real_distribution<double>(0, 1)(random) < share;
-  };
+  const auto draw = [&random] { return std::uniform_real_distribution<double>(0, 1)(random); };
+  const auto chance = [&draw](double share) { return share > 0 && draw() < share; };
   const firmware::Robot robot = bench::tx60l();
-  Bytes before;
+  Held before;
   for (int k = 0; k < times; ++k) {
     far.disturb();
-    const std::uint32_t last = far.look([](const bench::Arm& arm) { return arm.sequence(); });
-    const Bytes image = bench::make_image(robot, last + 1, 1, static_cast<std::uint32_t>(k) + 1);
+    const Transfer transfer = draw_transfer(before.status, draw());
+    const bool sends = transfer == Transfer::push || transfer == Transfer::trial;
+    const Bytes image =
+        bench::make_image(robot, before.status.active_sequence + 1, 1, static_cast<std::uint32_t>(k) + 1);
     host::PushOptions options;
+    if (transfer == Transfer::trial) options.trial_cycles = trial_cycles;
+    const unsigned kills_before = far.kills();
     if (chance(what.kills_controller)) {
-      far.kill_in(milliseconds(random() % 130), milliseconds(random() % 400));
+      // The shorter commands are over sooner.
+      far.kill_in(milliseconds(random() % (sends ? 130 : 30)), milliseconds(random() % 400));
     }
     int frames_left = chance(what.kills_client) ? static_cast<int>(random() % 420) : -1;
     options.progress = [&frames_left](std::size_t, std::size_t) {
@@ -275,7 +345,9 @@ Count push_over(const Disturbance& what, int times, std::uint32_t seed) {
     const auto start = steady_clock::now();
     try {
       const auto client = client_of(far);
-      host::push_image(*client, image, options);
+      if (sends) host::push_image(*client, image, options);
+      if (transfer == Transfer::confirm) host::confirm_trial(*client);
+      if (transfer == Transfer::rollback) host::roll_back(*client);
     } catch (const host::OutcomeOpen& e) {
       word = Word::open;
       why = e.what();
@@ -291,45 +363,47 @@ Count push_over(const Disturbance& what, int times, std::uint32_t seed) {
     if (!why.empty()) ++out.why[why];
     far.calm();
     // The judge looks into the controller, not over the bus.
-    const host::SetIdentity id = host::identity(image);
-    const auto [status, bytes] =
-        far.look([](bench::Arm& arm) { return std::pair(arm.device->status(), arm.pull()); });
-    const bool runs = id.is_active(status);
-    const bool whole = bytes == (runs ? image : before);
-    if (!whole) ++out.broken;
-    const bool told_wrong = (word == Word::active && !runs) || (word == Word::refused && runs);
+    const unsigned kills = far.kills() - kills_before;
+    const Judged judged = judge(far, before, transfer, image, kills);
+    if (!judged.is_whole) ++out.broken;
+    // What a restart ended after the word, or before a rollback, is no untrue word.
+    const bool restart_ended_trial = kills != 0 && (transfer == Transfer::trial || before.on_trial());
+    const bool told_wrong = (word == Word::active && !judged.is_active && !restart_ended_trial) ||
+                            (word == Word::refused && judged.is_active &&
+                             !(transfer == Transfer::rollback && restart_ended_trial));
     if (told_wrong) ++out.wrong;
-    if (!whole || told_wrong)
-      std::printf("  %s %d: word %d, runs %d, whole %d: %s\n", what.name, k, static_cast<int>(word), runs,
-                  whole, why.c_str());
+    if (!judged.is_whole || told_wrong)
+      std::printf("  %s %d: transfer %d, word %d, is so %d, whole %d: %s\n", what.name, k,
+                  static_cast<int>(transfer), static_cast<int>(word), judged.is_active, judged.is_whole,
+                  why.c_str());
     ++(word == Word::active    ? out.active
        : word == Word::refused ? out.refused
        : word == Word::open    ? out.open
                                : out.killed);
-    if (word == Word::open || word == Word::killed) {
+    if (sends && (word == Word::open || word == Word::killed)) {
       // What push --resume does, over a channel without disturbances.
       const auto client = client_of(far);
       const bool found = host::read_back(*client, image).has_value();
-      if (found != runs) ++out.wrong;
+      if (found != (judged.now.active == image)) ++out.wrong;
     }
-    before = bytes;
+    before = judged.now;
   }
   return out;
 }
 
-TEST(DisturbedCan, EveryPushEndsInATrueWord) {
+TEST(DisturbedCan, EveryTransferEndsInATrueWord) {
   const char* const text = std::getenv("FLEXCOMP_TRANSFERS");
   const int all = text == nullptr ? 55 : std::atoi(text);
   const int each =
       std::max(1, (all + static_cast<int>(disturbances.size()) - 1) / static_cast<int>(disturbances.size()));
   std::printf(
-      "| CAN: %-36s | pushes | active | refused | open | client killed | untrue | not whole | mean s | "
+      "| CAN: %-36s | transfers | active | refused | open | client killed | untrue | not whole | mean s | "
       "longest s |\n",
       "channel");
   std::uint32_t seed = 16;
   for (const Disturbance& what : disturbances) {
-    const Count c = push_over(what, each, seed += 10);
-    std::printf("| %-41s | %6d | %6d | %7d | %4d | %13d | %6d | %9d | %6.2f | %9.2f |\n", what.name, each,
+    const Count c = transfers_over(what, each, seed += 10);
+    std::printf("| %-41s | %9d | %6d | %7d | %4d | %13d | %6d | %9d | %6.2f | %9.2f |\n", what.name, each,
                 c.active, c.refused, c.open, c.killed, c.wrong, c.broken, c.seconds / each, c.longest_s);
     if (std::getenv("FLEXCOMP_REASONS") != nullptr) {
       for (const auto& [why, count] : c.why) std::printf("    %d x %s\n", count, why.c_str());

@@ -222,7 +222,8 @@ class Store {
   struct Permission {
     Origin origin = nobody;
     wire::Command command = wire::Command::none;  ///< the one that was signed; none: either
-    std::uint32_t challenge = 0;                  ///< number that an unlock has to repeat; 0: given
+    std::uint32_t challenge = 0;                  ///< number that an unlock has to repeat
+    bool is_given = false;                        ///< it was repeated, or the command was signed
     std::uint32_t since_ms = 0;
   };
   Permission permission_{};

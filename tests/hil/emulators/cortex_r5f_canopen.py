@@ -12,13 +12,12 @@ import math
 import os
 import random
 import re
-import socket
 import struct
 import subprocess
 import sys
 import time
 
-from emulated import PATIENCE, Bench
+from emulated import PATIENCE, Bench, periods_left_out
 
 import buses
 from buses import check, check_equal, flexcomp, passed, read, set_of, write
@@ -175,21 +174,6 @@ def running_cycle(bench, bus):
     time.sleep(0.5)
     check(ok() > before, "the cycle goes on correcting")
     passed(f"the running cycle corrects the standing arm as compensate does: {', '.join(f'{c:.5f}' for c in told)} deg")
-
-
-def periods_left_out():
-    """What the board counts, read from its memory by QEMU's monitor."""
-    symbols = subprocess.run(["arm-none-eabi-nm", os.environ["FLEXCOMP_IMAGE"]], capture_output=True, text=True, check=True,
-                             timeout=60).stdout
-    address = re.search(r"^([0-9a-f]+) \w board_periods_left_out$", symbols, re.M).group(1)
-    with socket.socket(socket.AF_UNIX) as monitor:
-        monitor.settimeout(PATIENCE)
-        monitor.connect(os.environ["FLEXCOMP_MONITOR"])
-        monitor.sendall(f"xp /1dw 0x{address}\n".encode())
-        said = b""
-        while not (word := re.search(rb"\b0*%s:\s+(\d+)" % address.lstrip("0").encode(), said)):
-            said += monitor.recv(4096)
-    return int(word.group(1))
 
 
 def no_cycle_is_missed(bench):

@@ -3,9 +3,11 @@
 of the Cortex-M7 also its console, and a Modbus master of their own."""
 import json
 import os
+import re
 import select
 import socket
 import struct
+import subprocess
 import sys
 import time
 
@@ -48,6 +50,21 @@ class Console:
                 return report
             check(time.monotonic() < end, f"waited for {what}", report)
             time.sleep(0.02)
+
+
+def periods_left_out():
+    """What the board of the Cortex-R5F counts, read from its memory by QEMU's monitor."""
+    symbols = subprocess.run(["arm-none-eabi-nm", os.environ["FLEXCOMP_IMAGE"]], capture_output=True, text=True, check=True,
+                             timeout=60).stdout
+    address = re.search(r"^([0-9a-f]+) \w board_periods_left_out$", symbols, re.M).group(1)
+    with socket.socket(socket.AF_UNIX) as monitor:
+        monitor.settimeout(PATIENCE)
+        monitor.connect(os.environ["FLEXCOMP_MONITOR"])
+        monitor.sendall(f"xp /1dw 0x{address}\n".encode())
+        said = b""
+        while not (word := re.search(rb"\b0*%s:\s+(\d+)" % address.lstrip("0").encode(), said)):
+            said += monitor.recv(4096)
+    return int(word.group(1))
 
 
 class Master:
