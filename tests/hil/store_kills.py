@@ -7,18 +7,16 @@ to be active is; and a plain restart changes nothing.
 """
 import os
 import random
-import socket
-import struct
 import sys
 import tempfile
 import threading
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from buses import CALIBRATION, TCP_UNIT, check, modbus_request, read, write  # noqa: E402
+from buses import CALIBRATION, check, read, write  # noqa: E402
 from disturbed_buses import Bench  # noqa: E402
 
-TRIAL, RESTORE = 4, 8  # a state, a command
+TRIAL = 4  # a state
 # The client waits for the controller that is started again.
 PATIENT = 5
 
@@ -49,17 +47,6 @@ class Killer(threading.Thread):
         self.bench.start()
 
 
-def restore(port):
-    """The answer may get lost with the controller."""
-    try:
-        with socket.create_connection(("127.0.0.1", port), 5) as sock:
-            sock.settimeout(1)
-            modbus_request(sock, TCP_UNIT, struct.pack(">BHHBIH", 0x10, 0x00A0, 3, 6, 0, RESTORE))
-            time.sleep(0.05)
-    except (OSError, struct.error, IndexError):
-        pass
-
-
 def one_kill(bench, k, held, counts):
     """held: sequence → image of every set that has run permanently."""
     rng, work = bench.rng, bench.work
@@ -79,15 +66,12 @@ def one_kill(bench, k, held, counts):
         word, err = bench.flexcomp(*on_trial, timeout=PATIENT)
         check(word == "active", "a push on trial that nothing disturbs", err)
     arguments = {"push": push, "trial": on_trial, "confirm": ["push", "--to", bench.clean, "--confirm"],
-                 "end trial": ["rollback", "--at", bench.clean], "rollback": ["rollback", "--at", bench.clean]}
+                 "end trial": ["rollback", "--at", bench.clean], "rollback": ["rollback", "--at", bench.clean],
+                 "restore": ["erase", "--at", bench.clean, "--yes"]}
     store_before = read(f"{work}/store.bin")
     killer = Killer(bench, rng)
     killer.start()
-    word = None
-    if what == "restore":
-        restore(bench.port)
-    else:
-        word, _ = bench.flexcomp(*arguments[what], timeout=PATIENT)
+    word, _ = bench.flexcomp(*arguments[what], timeout=PATIENT)
     killer.is_over.set()
     killer.join()
     now, image = bench.judge()

@@ -34,7 +34,7 @@ SETS = {
     "identified": buses.CALIBRATION[:buses.CALIBRATION.index("  - {{effect: gear_harmonic")],
     "many-effects": buses.CALIBRATION,
 }
-VERIFY, COMMIT, ROLLBACK, ABORT, RESTORE = 2, 3, 6, 7, 8
+VERIFY, COMMIT, ROLLBACK, ABORT, RESTORE, UNLOCK = 2, 3, 6, 7, 8, 9
 
 
 class Controller:
@@ -85,6 +85,9 @@ class Controller:
         check(status["answer"] == 1, "and it is refused", status)
 
     def run(self, command):
+        if command in (ROLLBACK, RESTORE):
+            check(self.master.command(UNLOCK) == 0, "an unlock is asked for")
+            check(self.master.command(UNLOCK, self.master.status()["detail"]) == 0, "and answered")
         check(self.master.command(command) == 0, f"command {command}")
         status = self.settle()
         check(status["answer"] == 0, f"command {command} is carried out", status)
