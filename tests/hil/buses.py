@@ -243,7 +243,7 @@ def spoiled_images(image):
         "for another robot": (with_crc(changed(48, bytes(32))), "for another robot"),
         "for another geometry": (with_crc(changed(16, bytes(32))), "for another nominal geometry"),
         "of an unknown schema": (with_crc(changed(4, b"\x09")), "schema is not known"),
-        "with an unknown basis": (with_crc(changed(first_term + 6, b"\xc8")), "basis that the controller does not"),
+        "with an unknown basis": (with_crc(changed(first_term + 6, b"\xc8")), "basis 200 is not known to the controller"),
         "with a NaN": (with_crc(changed(first_term + 24, struct.pack("<d", math.nan))), "out of range"),
         "beyond plausible": (with_crc(changed(first_term + 24, struct.pack("<d", 0.5))), "farther than is plausible"),
         "of an old sequence": (image, "sequence is not above"),
@@ -355,9 +355,8 @@ def broken_off(bench):
         check(modbus_request(sock, TCP_UNIT, begin)[0] == 0x10, "begin over a plain socket")
         window = struct.pack(">BHHBI", 0x10, 0x0100, 2 + 120, 244, 0) + half
         check(modbus_request(sock, TCP_UNIT, window)[0] == 0x10, "a window over a plain socket")
-        busy = flexcomp("push", "--to", bench.address["modbus-rtu"], f"{bench.work}/cal.yaml", "--timeout", "1.5",
-                        expect=4)
-        check("busy" in busy.err, "another client is told that the controller is busy", busy)
+        waited = flexcomp("push", "--to", bench.address["modbus-rtu"], f"{bench.work}/cal.yaml")
+        check(waited.seconds > 2, "another client waits for the first one, and takes over when that has been silent for 3 s", waited)
     flexcomp("push", "--to", bench.address["modbus-tcp"], f"{bench.work}/cal.yaml")
     passed("modbus-tcp: a connection that breaks half-way leaves nothing; the next push works")
 
@@ -379,7 +378,7 @@ def broken_off(bench):
         flexcomp("push", "--to", bench.address["can"], f"{bench.work}/cal.yaml")
         passed("can: a transfer that stops half-way gives way to the next push")
     after = set_of(bench.status("modbus-tcp"))
-    check(after[0] == before[0] + (3 if "can" in bench.buses else 2), "only whole pushes count", before, after)
+    check(after[0] == before[0] + (4 if "can" in bench.buses else 3), "only whole pushes count", before, after)
 
 
 def restart(bench):
@@ -672,7 +671,7 @@ def judge_by_modbus_tools(bench, status):
             answer = function(0, 64, slave=unit)
             check(not answer.isError(), f"pymodbus reads on {bus}", answer)
             record = b"".join(struct.pack(">H", r) for r in answer.registers)
-            check(record[:4] == b"\x01\x00\x00\x06" and record[40:104] == expected, "the capability record", record.hex())
+            check(record[:4] == b"\x01\x01\x00\x06" and record[40:104] == expected, "the capability record", record.hex())
         wrong = client.read_holding_registers(0x0090, 1, slave=unit)
         check(wrong.isError() and wrong.exception_code == 2, "exception 02 between the blocks", wrong)
         wrong = client.write_register(0x0000, 1, slave=unit)

@@ -20,7 +20,16 @@ OWN_REQUEST, OWN_ANSWER = 0x67F + NODE, 0x6AF + NODE
 OFF = 0x80000000
 NO_OBJECT, NO_SUB, READ_ONLY, WRITE_ONLY = 0x06020000, 0x06090011, 0x06010002, 0x06010001
 TOO_LONG, TOO_SHORT, NO_DATA, NOT_STORED, VALUE = 0x06070012, 0x06070013, 0x08000024, 0x08000020, 0x06090030
+LOCAL_CONTROL = 0x08000021
 START, STOP, PRE_OPERATIONAL, RESET = 1, 2, 128, 130
+
+
+def unlock(sdo):
+    """What a master does before it erases."""
+    for argument in (0, None):
+        argument = sdo.number(0x2002, 6) if argument is None else argument
+        check(sdo.download(0x2011, 1, struct.pack("<I", argument)) == 0, "an argument is taken")
+        check(sdo.download(0x2011, 2, struct.pack("<H", 9)) == 0, "an unlock is taken")
 
 
 def prepare(work):
@@ -187,6 +196,9 @@ def entries(work):
                     check(code == (TOO_LONG if wrong > size else TOO_SHORT), f"{at} with {wrong} bytes", hex(code))
                 data = signature.get(index, value)
                 for write_it in (sdo.download, sdo.download_segments, lambda *a: sdo.download(*a, sized=False)):
+                    if (index, sub) == (0x1011, 1):
+                        check(sdo.download(index, sub, data) == LOCAL_CONTROL, "one frame erases nothing")
+                        unlock(sdo)
                     code = write_it(index, sub, data)
                     while sdo.number(0x2002, 1) == 3:  # working
                         time.sleep(0.01)
