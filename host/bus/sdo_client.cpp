@@ -95,6 +95,8 @@ constexpr std::array abort_codes = std::to_array<AbortCode>({
 
 /// Limit of an upload, bytes: a server that sends without end is stopped.
 constexpr std::size_t longest = std::size_t{1} << 24U;
+/// More frames than a socket holds.
+constexpr unsigned most_queued = 4096;
 
 void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
   store_u16(frame.data() + 1, object.index);
@@ -153,7 +155,8 @@ void SdoClient::send(const Payload& payload, steady_clock::time_point end) {
 }
 
 bool SdoClient::receive(Payload& payload, steady_clock::time_point end) {
-  for (;;) {
+  // What is queued at the end is still read, but no flood that goes on.
+  for (unsigned left_over = 0; left_over < most_queued; left_over += steady_clock::now() < end ? 0U : 1U) {
     const auto left = std::chrono::ceil<milliseconds>(end - steady_clock::now()).count();
     pollfd ready{socket_, POLLIN, 0};
     const int n = ::poll(&ready, 1, static_cast<int>(std::max<long>(left, 0)));
@@ -175,11 +178,12 @@ bool SdoClient::receive(Payload& payload, steady_clock::time_point end) {
     std::copy_n(frame.data, payload.size(), payload.begin());
     return true;
   }
+  return false;
 }
 
 void SdoClient::drain() {
   Payload stale;
-  while (receive(stale, steady_clock::now())) {
+  for (unsigned k = 0; k < most_queued && receive(stale, steady_clock::now()); ++k) {
   }
 }
 
@@ -198,6 +202,14 @@ void SdoClient::abort(ObjectAddress object, std::uint32_t code) {
   store_u32(frame.data() + 4, code);
   send(frame, steady_clock::now() + timeout_);
   throw SdoAbort(object, code, false);
+}
+
+void SdoClient::give_up(ObjectAddress object) {
+  try {
+    abort(object, co::abort::timeout);
+  } catch (const SdoAbort&) {
+    throw SdoTimeout(fmt::format("no answer about {}", object.text()));
+  }
 }
 
 SdoClient::Fit SdoClient::fit(const Payload& answer, const Expected& expected) const {
@@ -250,38 +262,33 @@ SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& e
   send(request, end);
   Payload answer;
   for (;;) {
-    if (!receive(answer, std::min(again, end))) {
-      if (steady_clock::now() < end) {
-        ++disturbances_.lost;
-        send(request, end);
-        wait *= 2;
-        again = steady_clock::now() + wait;
-        continue;
-      }
-      try {
-        abort(object, co::abort::timeout);
-      } catch (const SdoAbort&) {
-        throw SdoTimeout(fmt::format("no answer about {}", object.text()));
-      }
-    }
-    if (answer[0] == aborted) {
+    const bool is_heard = receive(answer, std::min(again, end));
+    if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, expected);
-      continue;
+    } else if (is_heard) {
+      switch (fit(answer, expected)) {
+        case Fit::yes:
+          last_ = answer;
+          return answer;
+        case Fit::doubled:
+          ++disturbances_.doubled;
+          break;
+        case Fit::foreign:
+          ++disturbances_.foreign;
+          break;
+        case Fit::out_of_step:
+          ++disturbances_.foreign;
+          abort(object, co::abort::toggle);
+      }
     }
-    switch (fit(answer, expected)) {
-      case Fit::yes:
-        last_ = answer;
-        return answer;
-      case Fit::doubled:
-        ++disturbances_.doubled;
-        break;
-      case Fit::foreign:
-        ++disturbances_.foreign;
-        break;
-      case Fit::out_of_step:
-        ++disturbances_.foreign;
-        abort(object, co::abort::toggle);
-    }
+    // Answers to others do not stop the clock.
+    const auto now = steady_clock::now();
+    if (is_heard && now < std::min(again, end)) continue;
+    if (now >= end) give_up(object);
+    ++disturbances_.lost;
+    send(request, end);
+    wait *= 2;
+    again = now + wait;
   }
 }
 
@@ -407,27 +414,24 @@ SdoClient::Payload SdoClient::await_taken(ObjectAddress object, const Payload& l
   auto again = steady_clock::now() + wait;
   Payload answer;
   for (;;) {
-    if (!receive(answer, std::min(again, end))) {
-      if (steady_clock::now() >= end) {
-        try {
-          abort(object, co::abort::timeout);
-        } catch (const SdoAbort&) {
-          throw SdoTimeout(fmt::format("no answer about {}", object.text()));
-        }
-      }
-      ++disturbances_.lost;
-      send(last_segment, end);
-      wait *= 2;
-      again = steady_clock::now() + wait;
-    } else if (answer[0] == aborted) {
+    const bool is_heard = receive(answer, std::min(again, end));
+    if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, {.object = object, .first = false});
-    } else if ((answer[0] & subcommand_mask) == (block_upload | sub_block_taken) && answer[1] <= sent &&
-               !(alternates && answer == last_)) {
-      last_ = answer;
-      return answer;
-    } else {
+    } else if (is_heard) {
+      if ((answer[0] & subcommand_mask) == (block_upload | sub_block_taken) && answer[1] <= sent &&
+          !(alternates && answer == last_)) {
+        last_ = answer;
+        return answer;
+      }
       ++((answer[0] & specifier_mask) == block_upload ? disturbances_.doubled : disturbances_.foreign);
     }
+    const auto now = steady_clock::now();
+    if (is_heard && now < std::min(again, end)) continue;
+    if (now >= end) give_up(object);
+    ++disturbances_.lost;
+    send(last_segment, end);
+    wait *= 2;
+    again = now + wait;
   }
 }
 
@@ -470,52 +474,45 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
   };
   send(request, end);
   for (;;) {
-    if (!receive(answer, std::min(again, end))) {
-      now = steady_clock::now();
-      if (now >= end) {
-        try {
-          abort(object, co::abort::timeout);
-        } catch (const SdoAbort&) {
-          throw SdoTimeout(fmt::format("no answer about {}", object.text()));
-        }
-      }
-      ++disturbances_.lost;
-      if (taken != 0) {
-        take_stock();
-      } else {
-        send(request, end);
-        wait *= 2;
-        again = now + wait;
-      }
-      continue;
-    }
-    if (answer[0] == aborted) {
+    const bool is_heard = receive(answer, std::min(again, end));
+    now = steady_clock::now();
+    if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, {.object = object, .first = false});
-      continue;
+    } else if (is_heard) {
+      if (complete && (answer[0] & upload_answer_mask) == (block_download | block_end)) break;
+      const unsigned number = answer[0] & segment_number;
+      const bool last = (answer[0] & last_of_block) != 0;
+      if (complete || number == 0 || number > most) {
+        // Ours are below 64: what is above answers other clients, or is the server's first answer once more.
+        const bool names_other = number >= 0x40 && number < 0x70 && !last;
+        ++(names_other ? disturbances_.foreign : disturbances_.doubled);
+      } else {
+        if (number == taken + 1) {
+          ++taken;
+          out.insert(out.end(), answer.begin() + 1, answer.end());
+          if (out.size() >= longest_here + in_segment) abort(object, co::abort::too_long);
+          complete = last;
+          if (progress) progress(std::min(out.size(), longest_here), is_announced ? announced : out.size());
+          wait = std::max(timeout_ / 12, milliseconds(1));
+          end = now + timeout_;
+          again = now + wait;
+        } else if (number <= taken) {
+          ++disturbances_.doubled;
+        }
+        if (last || number == most) take_stock();
+        now = steady_clock::now();
+      }
     }
-    if (complete && (answer[0] & upload_answer_mask) == (block_download | block_end)) break;
-    const unsigned number = answer[0] & segment_number;
-    const bool last = (answer[0] & last_of_block) != 0;
-    if (complete || number == 0 || number > most) {
-      // Ours are below 64: what is above answers other clients, or is the server's first answer once more.
-      const bool names_other = number >= 0x40 && number < 0x70 && !last;
-      ++(names_other ? disturbances_.foreign : disturbances_.doubled);
-      continue;
-    }
-    if (number == taken + 1) {
-      ++taken;
-      out.insert(out.end(), answer.begin() + 1, answer.end());
-      if (out.size() >= longest_here + in_segment) abort(object, co::abort::too_long);
-      complete = last;
-      if (progress) progress(std::min(out.size(), longest_here), is_announced ? announced : out.size());
-      wait = std::max(timeout_ / 12, milliseconds(1));
-      now = steady_clock::now();
-      end = now + timeout_;
+    if (is_heard && now < std::min(again, end)) continue;
+    if (now >= end) give_up(object);
+    ++disturbances_.lost;
+    if (taken != 0) {
+      take_stock();
+    } else {
+      send(request, end);
+      wait *= 2;
       again = now + wait;
-    } else if (number <= taken) {
-      ++disturbances_.doubled;
     }
-    if (last || number == most) take_stock();
   }
   const std::size_t unused = (answer[0] >> 2U) & 7U;
   out.resize(out.size() - std::min(unused, out.size()));

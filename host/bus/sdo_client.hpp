@@ -118,6 +118,8 @@ class SdoClient {
   bool receive(Payload& payload, std::chrono::steady_clock::time_point end);
   void drain();
   [[noreturn]] void abort(ObjectAddress object, std::uint32_t code);
+  /// Ends a transfer whose answer does not come. \throws SdoTimeout
+  [[noreturn]] void give_up(ObjectAddress object);
 
   int socket_;
   std::uint16_t request_id_;
