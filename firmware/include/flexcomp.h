@@ -82,7 +82,7 @@ typedef FLEXCOMP_SCALAR flexcomp_real;
   (400 * sizeof(flexcomp_real) + FLEXCOMP_TERMS * (20 + 2 * sizeof(flexcomp_real)) + FLEXCOMP_TABLES * 12 + \
    FLEXCOMP_TABLE_VALUES * sizeof(flexcomp_real))
 /** Memory of one arm: staging, two sets, and the rest. */
-#define FLEXCOMP_MEMORY_BYTES (4032 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
+#define FLEXCOMP_MEMORY_BYTES (4096 + FLEXCOMP_STAGING_BYTES + 2 * FLEXCOMP_SET_BYTES)
 /** Memory of one CANopen node. */
 #define FLEXCOMP_CAN_BYTES 1248
 /** Memory of one Modbus serial line. */
@@ -309,7 +309,8 @@ typedef enum flexcomp_event {
 typedef enum flexcomp_permit {
   FLEXCOMP_REFUSE = 0, /**< the command is answered `not_authorised` (4) and nothing happens */
   FLEXCOMP_ALLOW = 1,  /**< nothing speaks against it */
-  /** The same; and where it would need an unlock or a signature, this takes their place: for a key switch, or a panel. */
+  /** The same; and where rollback or restore would need an unlock or a signed command, this takes their place: for a
+   * key switch, or a panel. A set needs its signature all the same. */
   FLEXCOMP_AUTHORISE = 2
 } flexcomp_permit;
 
@@ -337,15 +338,15 @@ typedef struct flexcomp_trust {
   const uint8_t (*keys)[32];
   unsigned count; /**< of the keys, 0 ... 65535; of more than one each counts */
   /** A library's or the platform's Ed25519: 1 where the signature (64 bytes) of the message (48 bytes) belongs to the key, 2
-   * where it needs more time (the same call then comes again, with the next poll), any other number where it does
-   * not. */
+   * where it needs more time (the same call then comes again with the next poll, for staging_timeout_ms; at the start at
+   * once, at most 100,000 times for each reading of a slot), any other number where it does not. */
   int (*check)(void* user, const uint8_t* public_key, const uint8_t* signature, const uint8_t* message,
                size_t size);
 } flexcomp_trust;
 
 /** From now on only signed sets are used, from the buses, by flexcomp_stage_commit, and of what is stored; rollback and
- * FLEXCOMP_COMMAND_RESTORE_DEFAULTS over a bus need a signed command, or `permit` that authorises. Before
- * flexcomp_boot. 0, and nothing is changed, where `check` or the keys are missing or the robot has no serial number.
+ * FLEXCOMP_COMMAND_RESTORE_DEFAULTS over a bus need a signed command, or `permit` that authorises. 0, and nothing is
+ * changed, after flexcomp_boot, and where `check` or the keys are missing or the robot has no serial number.
  * BACKGROUND; small, no hook. */
 int flexcomp_set_trust(flexcomp_arm* fc, const flexcomp_trust* trust);
 

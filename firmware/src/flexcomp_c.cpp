@@ -410,12 +410,13 @@ void flexcomp_set_hooks(flexcomp_arm* fc, const flexcomp_hooks* hooks) {
 
 int flexcomp_set_trust(flexcomp_arm* fc, const flexcomp_trust* trust) {
   Arm& arm = arm_of(fc);
-  if (trust->check == nullptr || trust->keys == nullptr || trust->count == 0 || trust->count > 0xFFFF ||
-      !flexcomp::is_given(arm.device.robot().unit_hash)) {
+  if (trust == nullptr || trust->check == nullptr || trust->keys == nullptr || trust->count == 0 ||
+      trust->count > 0xFFFF || !flexcomp::is_given(arm.device.robot().unit_hash)) {
     return 0;
   }
+  if (!arm.device.set_trust({&arm, trust->keys, static_cast<std::uint16_t>(trust->count), Arm::check}))
+    return 0;
   arm.trust = *trust;
-  arm.device.set_trust({&arm, trust->keys, static_cast<std::uint16_t>(trust->count), Arm::check});
   return 1;
 }
 

@@ -69,7 +69,7 @@ bool Slots::read_seals(unsigned slot, StoredSet& set) {
                              load_u32(seal + 16),
                              1};
     if (found.bytes < shortest_image || found.bytes > staging_bytes) continue;
-    note_counter(load_u64(seal + 20));
+    note_counter_in(slot, load_u64(seal + 20));
     if (set.seals == 0) set = found;
     // Others than the first can only be what is left of an erase.
     if (found.crc == set.crc && found.generation == set.generation && set.seals < most_seals && copy != 0 &&
@@ -93,7 +93,10 @@ StorageResult Slots::add_seal(StoredSet& set) {
     std::uint8_t there[seal_bytes];
     if (!read_unit(set.slot, seal_offset(copy), there) || !is_erased(there)) continue;
     const StorageResult r = write_unit(set.slot, seal_offset(copy), seal);
-    if (r == StorageResult::done) ++set.seals;
+    if (r == StorageResult::done) {
+      ++set.seals;
+      counter_in_[set.slot] = counter_;
+    }
     if (r != StorageResult::failed) return r;
   }
   return StorageResult::failed;
@@ -111,7 +114,7 @@ void Slots::read_marks(unsigned slot) {
     if (!is_read || !is_whole(mark, mark_magic)) continue;
     marks.generation[k] = load_u32(mark + 4);
     note_generation(marks.generation[k]);
-    note_counter(load_u64(mark + 8));
+    note_counter_in(slot, load_u64(mark + 8));
   }
 }
 
@@ -123,9 +126,19 @@ unsigned Slots::marks_against(const StoredSet& set) const {
   return count;
 }
 
-StorageResult Slots::add_mark(unsigned slot) {
+void Slots::note_counter_in(unsigned slot, std::uint64_t seen) {
+  if (seen > counter_in_[slot]) counter_in_[slot] = seen;
+  note_counter(seen);
+}
+
+StorageResult Slots::keep_counter(unsigned slot) {
+  if (counter_in_[slot] >= counter_ || marks_[slot].next >= most_notes) return StorageResult::done;
+  return add_mark(slot, 0);
+}
+
+StorageResult Slots::add_mark(unsigned slot, std::uint32_t generation) {
   std::uint8_t mark[unit_bytes];
-  make_unit(mark_magic, generation_, mark);
+  make_unit(mark_magic, generation, mark);
   Marks& marks = marks_[slot];
   while (marks.next < most_marks) {
     const unsigned k = marks.next;
@@ -133,7 +146,8 @@ StorageResult Slots::add_mark(unsigned slot) {
     if (r == StorageResult::busy) return r;
     ++marks.next;
     if (r == StorageResult::failed) continue;
-    marks.generation[k] = generation_;
+    marks.generation[k] = generation;
+    counter_in_[slot] = counter_;
     return r;
   }
   return StorageResult::failed;
@@ -152,13 +166,19 @@ bool Slots::is_counted(const StoredSet& set) const {
 StorageResult Slots::announce(const StoredSet& set) {
   std::uint8_t unit[unit_bytes];
   make_unit(begin_magic, set.generation, unit);
-  return write_unit(set.slot, begin_offset, unit);
+  const StorageResult r = write_unit(set.slot, begin_offset, unit);
+  if (r == StorageResult::done) counter_in_[set.slot] = counter_;
+  return r;
 }
 
 StorageResult Slots::erase(unsigned slot) {
   if (storage_.erase == nullptr) return StorageResult::failed;
+  if (counter_in_[slot] > counter_in_[slot ^ 1U] && keep_counter(slot ^ 1U) == StorageResult::busy)
+    return StorageResult::busy;
   const StorageResult r = storage_.erase(storage_.user, slot);
-  if (r != StorageResult::failed) marks_[slot] = Marks{};
+  if (r == StorageResult::failed) return r;
+  marks_[slot] = Marks{};
+  counter_in_[slot] = 0;
   return r;
 }
 
@@ -168,7 +188,12 @@ void Slots::survey(std::array<StoredSet, 2>& found) {
     read_seals(slot, found[slot]);
     note_generation(found[slot].generation);
   }
-  for (unsigned slot = 0; slot < 2; ++slot) read_marks(slot);
+  for (unsigned slot = 0; slot < 2; ++slot) {
+    read_marks(slot);
+    std::uint8_t unit[unit_bytes];
+    if (read_unit(slot, begin_offset, unit) && is_whole(unit, begin_magic))
+      note_counter_in(slot, load_u64(unit + 8));
+  }
 }
 
 std::uint16_t Slots::target(std::uint16_t active) {

@@ -134,6 +134,7 @@ bool Store::is_in_staging(const StoredSet& set) const {
 }
 
 void Store::boot() {
+  has_booted_ = true;
   std::array<StoredSet, 2> found{};
   slots_.survey(found);
   const StoredSet &a = found[0], &b = found[1];
@@ -327,13 +328,21 @@ bool Store::check_slice(Refusal& r, std::uint32_t& detail) {
   return true;
 }
 
-void Store::set_trust(const Trust& trust) {
+bool Store::set_trust(const Trust& trust) {
+  if (has_booted_) return false;
   trust_ = trust;
   check_signature_ = trust.count != 0 ? check_signature : nullptr;
+  return true;
 }
 
 bool Store::check_signature(Store& store, bool begins, Refusal& r) {
-  if (!begins) return store.signature_.advance(store.trust_, r);
+  if (!begins) {
+    const bool is_late = store.now_ms_ - store.signature_since_ms_ >= store.settings_.staging_timeout_ms;
+    if (store.signature_.advance(store.trust_, r)) return true;
+    if (is_late) r = Refusal::wrong_signature;
+    return is_late;
+  }
+  store.signature_since_ms_ = store.now_ms_;
   r = store.begin_signature();
   return r != Refusal::none;
 }
@@ -404,10 +413,11 @@ void Store::checked(Refusal r, std::uint32_t detail) {
     return;
   }
   if (is_command_ && r == Refusal::none) {
-    permission_ = {owner_, static_cast<Command>(load_u16(staging_.data() + signing::command_number)), 0, true,
-                   now_ms_};
+    permission_ = {owner_,  static_cast<Command>(load_u16(staging_.data() + signing::command_number)),
+                   0,       true,
+                   now_ms_, active_.crc};
     slots_.note_counter(check_counter_);
-    finish(Answer::accepted);
+    job_ = Job::keep_counter;
     return;
   }
   const std::uint32_t ahead = header_.sequence - active_.sequence;
@@ -526,7 +536,7 @@ Answer Store::verify(Origin origin) {
 }
 
 Answer Store::drop(Origin origin) {
-  if (is_verifying() && owns(origin)) {
+  if (is_checking() && owns(origin)) {
     finish(Answer::accepted);
     return Answer::accepted;
   }
@@ -592,7 +602,6 @@ void Store::begin_commit() {
   faults_ = static_cast<std::uint16_t>(faults_ & ~wire::fault::trial_reverted);
   // From here on the other slot holds nothing that a rollback could use.
   previous_ = StoredSet{};
-  if (check_signature_ != nullptr && !job_trial_) slots_.note_counter(check_counter_);
 }
 
 Answer Store::confirm() {
@@ -647,15 +656,19 @@ Answer Store::restore() {
 /// An unlock in two steps, so that no single frame, and none that was recorded, opens what destroys sets.
 Answer Store::unlock(std::uint32_t argument, Origin origin) {
   if (trust_.count != 0) return answer(Answer::not_authorised, wire::needs_signature);
+  if (!has_polled_) return answer(Answer::busy);
   if (argument == 0) {
-    const std::uint32_t seed[2] = {++challenges_, now_ms_};
+    // With the generation a number that was recorded does not come again once its command has been carried out.
+    const std::uint32_t seed[4] = {++challenges_, now_ms_, slots_.generation(),
+                                   load_u32(robot_.unit_hash.data())};
     std::uint8_t bytes[sizeof seed];
     std::memcpy(bytes, seed, sizeof seed);
-    permission_ = {origin, Command::none, crc32(bytes, sizeof bytes) | 1U, false, now_ms_};
+    permission_ = {origin, Command::none, crc32(bytes, sizeof bytes) | 1U, false, now_ms_, active_.crc};
     return answer(Answer::accepted, permission_.challenge);
   }
   // The answer may be lost: the right number may come again.
-  if (permission_.origin == origin && permission_.challenge == argument) {
+  if (permission_.origin == origin && permission_.challenge == argument &&
+      now_ms_ - permission_.since_ms < permission_ms) {
     permission_.is_given = true;
     return answer(Answer::accepted);
   }
@@ -665,7 +678,7 @@ Answer Store::unlock(std::uint32_t argument, Origin origin) {
 
 /// Whether a client may run a command that destroys sets.
 bool Store::has_permission(Command command, Origin origin) const {
-  return permission_.origin == origin && permission_.is_given &&
+  return permission_.origin == origin && permission_.is_given && permission_.active_crc == active_.crc &&
          now_ms_ - permission_.since_ms < permission_ms &&
          (permission_.command == command || (permission_.command == Command::none && trust_.count == 0));
 }
@@ -771,6 +784,12 @@ void Store::work() {
       if (check_slice(verdict, detail)) checked(verdict, detail);
       return;
     }
+    case Job::keep_counter:
+      // It is used up also where the command never comes.
+      r = slots_.keep_counter(active_.slot == wire::no_slot ? 0U : active_.slot);
+      if (r == StorageResult::done) finish(Answer::accepted);
+      if (r == StorageResult::failed) permission_ = Permission{};
+      break;
     case Job::check_active: {
       // Until now the other slot may hold the only set that can still be read.
       std::uint8_t chunk[chunk_bytes];
@@ -792,6 +811,8 @@ void Store::work() {
       if (r == StorageResult::done) job_ = Job::announce;
       break;
     case Job::announce: {
+      // Used up, also where a trial ends without a confirm.
+      if (check_signature_ != nullptr) slots_.note_counter(check_counter_);
       r = slots_.announce(incoming_);
       if (r == StorageResult::done) job_ = Job::write;
       break;
@@ -840,7 +861,6 @@ void Store::work() {
       }
       job_trial_ = true;
       job_ = Job::seal;
-      if (check_signature_ != nullptr) slots_.note_counter(check_counter_);
       break;
     case Job::seal:
       r = slots_.add_seal(incoming_);
@@ -917,6 +937,7 @@ void Store::work() {
 
 void Store::poll(std::uint32_t now_ms) {
   now_ms_ = now_ms;
+  has_polled_ = true;
   if (touched_) {
     touched_ = false;
     touched_ms_ = now_ms;

@@ -234,6 +234,9 @@ int serve(const Options& options) {
   std::atomic<bool> stop{false};
   std::thread cycle(run_cycle, std::ref(*device), options.cycle_us, std::cref(stop));
 
+  // Before the word that they serve: a CANopen node answers once it has sent its boot-up message.
+  for (const auto& port : ports) port->serve();
+  device->poll(hil::now_ms());
   std::string ready = "ready robot=" + robot.name;
   for (const auto& port : ports) ready += " " + port->text();
   ready += " cycle_us=" + std::to_string(options.cycle_us) +

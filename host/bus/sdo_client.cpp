@@ -95,8 +95,8 @@ constexpr std::array abort_codes = std::to_array<AbortCode>({
 
 /// Limit of an upload, bytes: a server that sends without end is stopped.
 constexpr std::size_t longest = std::size_t{1} << 24U;
-/// More frames than a socket holds.
-constexpr unsigned most_queued = 4096;
+/// More frames than a socket of Linux holds by default, 212,992 bytes with some 800 for each.
+constexpr unsigned most_queued = 300;
 
 void address(std::array<std::uint8_t, 8>& frame, ObjectAddress object) {
   store_u16(frame.data() + 1, object.index);
@@ -256,7 +256,7 @@ void SdoClient::throw_if_ours(const Payload& answer, const Expected& expected) {
 
 SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& expected, bool once) {
   const ObjectAddress object = expected.object;
-  const auto end = steady_clock::now() + (once ? timeout_ / 4 : timeout_);
+  const auto end = once ? steady_clock::now() + timeout_ / 4 : answer_end();
   auto wait = std::max(timeout_ / 12, milliseconds(1));
   auto again = once ? end : steady_clock::now() + wait;
   send(request, end);
@@ -302,13 +302,24 @@ SdoClient::Payload SdoClient::expedited_frame(ObjectAddress object,
   return frame;
 }
 
-void SdoClient::download_once(ObjectAddress object, std::span<const std::uint8_t> data) {
+/// A flood of answers that fit goes on no longer than this, nor does a server that sends slowly for ever.
+void SdoClient::begin_transfer(std::size_t bytes) {
+  // A bit rate of 20 kbit/s takes 1 ms for a byte.
+  transfer_end_ = steady_clock::now() + 10 * timeout_ + milliseconds(2 * bytes);
   drain();
+}
+
+steady_clock::time_point SdoClient::answer_end() const {
+  return std::min(steady_clock::now() + timeout_, transfer_end_);
+}
+
+void SdoClient::download_once(ObjectAddress object, std::span<const std::uint8_t> data) {
+  begin_transfer(data.size());
   exchange(expedited_frame(object, data), {object, download_initiated}, true);
 }
 
 void SdoClient::download(ObjectAddress object, std::span<const std::uint8_t> data, const Progress& progress) {
-  drain();
+  begin_transfer(data.size());
   if (!data.empty() && data.size() <= in_expedited) {
     exchange(expedited_frame(object, data), {object, download_initiated});
     return;
@@ -390,7 +401,7 @@ bool SdoClient::download_block(ObjectAddress object, std::span<const std::uint8_
 
 std::size_t SdoClient::send_sub_block(std::span<const std::uint8_t> data, std::size_t at, unsigned most,
                                       Payload& last, const Progress& progress) {
-  const auto end = steady_clock::now() + timeout_;
+  const auto end = answer_end();
   std::size_t sent = 0;
   while (sent != most && at != data.size()) {
     const std::size_t size = std::min(in_segment, data.size() - at);
@@ -409,7 +420,7 @@ std::size_t SdoClient::send_sub_block(std::span<const std::uint8_t> data, std::s
 /// answer. Where the server alternates between two sizes, an answer equal to the one before is a copy of it.
 SdoClient::Payload SdoClient::await_taken(ObjectAddress object, const Payload& last_segment, unsigned sent,
                                           bool alternates) {
-  const auto end = steady_clock::now() + timeout_;
+  const auto end = answer_end();
   auto wait = std::max(timeout_ / 12, milliseconds(1));
   auto again = steady_clock::now() + wait;
   Payload answer;
@@ -462,7 +473,7 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
   request = {block_upload | block_start};
   auto wait = std::max(timeout_ / 12, milliseconds(1));
   auto now = steady_clock::now();
-  auto end = now + timeout_;
+  auto end = answer_end();
   auto again = now + wait;
   const auto take_stock = [&] {
     most = most == co::most_segments ? co::most_segments - 1U : co::most_segments;
@@ -494,7 +505,7 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
           complete = last;
           if (progress) progress(std::min(out.size(), longest_here), is_announced ? announced : out.size());
           wait = std::max(timeout_ / 12, milliseconds(1));
-          end = now + timeout_;
+          end = answer_end();
           again = now + wait;
         } else if (number <= taken) {
           ++disturbances_.doubled;
@@ -533,7 +544,9 @@ std::vector<std::vector<std::uint8_t>> SdoClient::upload_from_all(ObjectAddress 
   std::vector<std::vector<std::uint8_t>> out;
   Payload answer;
   constexpr std::size_t enough = 8;
-  while (out.size() < enough && receive(answer, steady_clock::now() + (out.empty() ? wait : wait / 2))) {
+  const auto end = steady_clock::now() + timeout_ / 2;
+  while (out.size() < enough && steady_clock::now() < end &&
+         receive(answer, steady_clock::now() + (out.empty() ? wait : wait / 2))) {
     const bool same_object = std::equal(frame.begin() + 1, frame.begin() + 4, answer.begin() + 1);
     const bool is_expedited = (answer[0] & (specifier_mask | expedited)) == (upload_initiated | expedited);
     if (same_object && is_expedited) out.emplace_back(answer.begin() + 4, answer.end());
@@ -543,7 +556,7 @@ std::vector<std::vector<std::uint8_t>> SdoClient::upload_from_all(ObjectAddress 
 
 std::vector<std::uint8_t> SdoClient::upload(ObjectAddress object, const Progress& progress,
                                             std::size_t expected_size) {
-  drain();
+  begin_transfer(expected_size);
   if (expected_size > in_few_segments && server_blocks_) {
     if (auto out = upload_block(object, progress)) return *std::move(out);
   }

@@ -117,6 +117,9 @@ class SdoClient {
   void send(const Payload& payload, std::chrono::steady_clock::time_point end);
   bool receive(Payload& payload, std::chrono::steady_clock::time_point end);
   void drain();
+  void begin_transfer(std::size_t bytes);
+  /// Until when an answer is waited for.
+  std::chrono::steady_clock::time_point answer_end() const;
   [[noreturn]] void abort(ObjectAddress object, std::uint32_t code);
   /// Ends a transfer whose answer does not come. \throws SdoTimeout
   [[noreturn]] void give_up(ObjectAddress object);
@@ -125,6 +128,7 @@ class SdoClient {
   std::uint16_t request_id_;
   std::uint16_t answer_id_;
   std::chrono::milliseconds timeout_;
+  std::chrono::steady_clock::time_point transfer_end_ = std::chrono::steady_clock::time_point::max();
   Payload last_{};             ///< the last answer that was taken
   bool server_blocks_ = true;  ///< until it refuses
   SdoDisturbances disturbances_;

@@ -65,7 +65,7 @@ std::uint64_t KeyOptions::next(const ControllerClient& client, const ControllerU
                              "wrong, or who answers is not the controller. Where both are right, --counter "
                              "{} goes on from there; "
                              "nothing was sent",
-                             unit.counter, out == 0 ? "N" : std::to_string(unit.counter + 1)));
+                             unit.counter, unit.counter + 2 <= 1 ? "N" : std::to_string(unit.counter + 1)));
 }
 
 void KeyOptions::authorise(OutcomeTask& task, wire::Command command, const SigningKey* signer) const {

@@ -205,16 +205,72 @@ TEST_F(Authority, ACounterIsUsedOnce) {
   EXPECT_EQ(arm->offer(signed_image(make_image(robot, 4), key, 0)), Refusal::counter_used) << "no wrap";
 }
 
-TEST_F(Authority, ATrialUsesItsCounterWhenItIsConfirmed) {
+TEST_F(Authority, ATrialUsesItsCounterAlsoWhereItReverts) {
   ASSERT_EQ(push(1, 1), Answer::accepted);
   const Bytes tried = signed_image(make_image(robot, 2), key, 2);
   ASSERT_EQ(arm->push(tried, Command::commit_trial, 5), Answer::reverted);
   ASSERT_EQ(arm->sequence(), 1U);
-  ASSERT_EQ(arm->push(tried, Command::commit_trial, 1000000), Answer::accepted) << "tried again";
+  EXPECT_EQ(arm->offer(tried), Refusal::counter_used) << "without the key nobody makes it permanent";
+  arm = started();
+  EXPECT_EQ(arm->offer(tried), Refusal::counter_used);
+  for (std::uint64_t k = 3; k < 40; ++k) {
+    ASSERT_EQ(push(2, k, Command::commit_trial), Answer::accepted) << "trial after trial";
+    ASSERT_EQ(run(k % 2 == 0 ? Command::rollback : Command::none),
+              k % 2 == 0 ? Answer::accepted : Answer::unknown_command);
+    arm = started();
+    ASSERT_EQ(arm->sequence(), 1U);
+    ASSERT_EQ(arm->device->unit().counter, k);
+  }
+  ASSERT_EQ(push(2, 40, Command::commit_trial), Answer::accepted);
   ASSERT_EQ(run(Command::confirm), Answer::accepted);
   arm->settle();
-  EXPECT_EQ(arm->device->unit().counter, 2U);
-  EXPECT_EQ(arm->offer(tried), Refusal::counter_used);
+  EXPECT_EQ(arm->sequence(), 2U);
+  EXPECT_EQ(arm->device->unit().counter, 40U);
+}
+
+TEST_F(Authority, ASignedCommandIsUsedUpByItsCheck) {
+  ASSERT_EQ(push(1, 1), Answer::accepted);
+  ASSERT_EQ(push(2, 2), Answer::accepted);
+  ASSERT_EQ(order(Command::rollback, 3), Answer::accepted);
+  arm = started();
+  EXPECT_EQ(arm->device->unit().counter, 3U);
+  EXPECT_EQ(order(Command::rollback, 3), Answer::refused);
+  EXPECT_EQ(run(Command::rollback), Answer::not_authorised);
+}
+
+TEST_F(Authority, ASignedCommandIsForTheSetThatRunsThen) {
+  ASSERT_EQ(push(1, 1), Answer::accepted);
+  ASSERT_EQ(push(2, 2), Answer::accepted);
+  for (const Command c : {Command::rollback, Command::restore_defaults}) {
+    const std::uint32_t now = arm->sequence();
+    ASSERT_EQ(order(c, 10 * now, 7), Answer::accepted);
+    ASSERT_EQ(push(now + 1, 10 * now + 1), Answer::accepted) << "another client";
+    EXPECT_EQ(run(c, 7), Answer::not_authorised);
+    EXPECT_EQ(arm->sequence(), now + 1);
+  }
+}
+
+// Power goes while a restore has written one mark of three: one mark voids nothing, and yet the counter in it counts.
+TEST_F(Authority, ARestoreThatWasCutLeavesItsCounter) {
+  ASSERT_EQ(push(1, 1), Answer::accepted);
+  ASSERT_EQ(push(2, 2), Answer::accepted);
+  const Flash before = flash;
+  for (long power = 0; power < 3 * static_cast<long>(slot_bytes); power += power % 32 == 31 ? 1 : 31) {
+    arm = nullptr;
+    flash = before;
+    arm = started();
+    ASSERT_EQ(order(Command::restore_defaults, 9), Answer::accepted);
+    flash.power = power;
+    try {
+      if (run(Command::restore_defaults) == Answer::accepted) arm->settle();
+    } catch (const PowerCut&) {
+    }
+    flash.power = -1;
+    for (int start = 0; start < 3; ++start) {
+      arm = started();
+      ASSERT_EQ(arm->device->unit().counter, 9U) << "power " << power << ", start " << start;
+    }
+  }
 }
 
 TEST_F(Authority, RollbackAndRestoreNeedASignedCommand) {
@@ -360,6 +416,15 @@ TEST_F(Authority, ASlowCheckHoldsUpNothing) {
   ASSERT_EQ(patient.run(Command::verify), Answer::accepted);
   for (int k = 0; k < 1000; ++k) patient.device->store().poll(patient.now_ms += 1);
   EXPECT_EQ(patient.run(Command::abort), Answer::accepted) << "its client gives it up";
+  ASSERT_EQ(patient.stage(signed_image(make_image(robot, 2), key, 2)), Answer::accepted);
+  ASSERT_EQ(patient.run(Command::commit), Answer::accepted);
+  for (int k = 0; k < 1000; ++k) patient.device->store().poll(patient.now_ms += 1);
+  EXPECT_EQ(patient.run(Command::abort), Answer::accepted) << "also of a commit, before anything is written";
+  ASSERT_EQ(patient.stage(signed_image(make_image(robot, 2), key, 2)), Answer::accepted);
+  ASSERT_EQ(patient.run(Command::commit), Answer::accepted);
+  for (int k = 0; k < 1000; ++k) patient.device->store().poll(patient.now_ms += 50);
+  EXPECT_EQ(patient.device->status().refusal, static_cast<std::uint16_t>(Refusal::wrong_signature))
+      << "or nobody does";
   Arm restarted(memory, {}, robot, late);
   EXPECT_EQ(restarted.sequence(), 0U) << "a start that never hears of it ends without a set";
   // Whatever else the function answers means no.
@@ -379,7 +444,7 @@ TEST_F(Authority, ASlowCheckHoldsUpNothing) {
 // FLEXCOMP_LONG_CUTS=100000 makes the long run.
 TEST_F(Authority, NoPowerCutBringsACounterBack) {
   std::mt19937 random(11);
-  std::uint64_t used = 0, next = 1;
+  std::uint64_t used = 0, told = 0, next = 1;
   std::uint32_t sequence = 1;
   unsigned cuts = 0, restores = 0;
   const char* text = std::getenv("FLEXCOMP_LONG_CUTS");
@@ -387,6 +452,8 @@ TEST_F(Authority, NoPowerCutBringsACounterBack) {
   for (unsigned long k = 0; k < operations; ++k) {
     if (!arm) arm = started();
     ASSERT_GE(arm->device->unit().counter, used) << "operation " << k;
+    ASSERT_GE(arm->device->unit().counter, told) << "operation " << k;
+    told = arm->device->unit().counter;
     if (arm->sequence() >= sequence) sequence = arm->sequence() + 1;
     const unsigned what = random() % 8;
     const std::uint64_t counter = next++;
@@ -394,7 +461,12 @@ TEST_F(Authority, NoPowerCutBringsACounterBack) {
     try {
       bool done = false;
       if (what < 5) {
-        done = push(sequence++, counter) == Answer::accepted;
+        done =
+            push(sequence++, counter, what < 4 ? Command::commit : Command::commit_trial) == Answer::accepted;
+        if (what == 4 && done) {
+          done = run(random() % 2 == 0 ? Command::confirm : Command::rollback) == Answer::accepted;
+          arm->settle();
+        }
       } else {
         const Command c = what < 7 ? Command::rollback : Command::restore_defaults;
         done = order(c, counter) == Answer::accepted && run(c) == Answer::accepted &&
@@ -447,11 +519,13 @@ TEST(Unlock, NoSingleFrameDestroysASet) {
   const std::uint32_t twice = challenge(1);
   EXPECT_EQ(store.run(Command::unlock, twice, 1), Answer::accepted);
   EXPECT_EQ(store.run(Command::unlock, twice, 1), Answer::accepted) << "its answer was lost";
-  EXPECT_EQ(arm.sequence(), 2U);
+  ASSERT_EQ(arm.push(make_image(arm.robot, 3)), Answer::accepted);
+  EXPECT_EQ(store.run(Command::rollback, 0, 1), Answer::not_authorised) << "another set runs now";
+  EXPECT_EQ(arm.sequence(), 3U);
   ASSERT_EQ(store.run(Command::unlock, challenge(1), 1), Answer::accepted);
   EXPECT_EQ(store.run(Command::rollback, 0, 1), Answer::accepted);
   arm.settle();
-  EXPECT_EQ(arm.sequence(), 1U);
+  EXPECT_EQ(arm.sequence(), 2U);
   EXPECT_EQ(store.run(Command::restore_defaults, 0, 1), Answer::not_authorised) << "once";
   // The end of a trial destroys nothing.
   ASSERT_EQ(arm.push(make_image(arm.robot, 3), Command::commit_trial, 100000), Answer::accepted);

@@ -189,6 +189,7 @@ class Arm {
       : flash(memory), robot(r), device(std::make_unique<Device>(r, memory.hooks(), settings)) {
     device->set_trust(trust);
     device->store().boot();
+    device->store().poll(now_ms);
     step();
   }
   /// On a flash of its own.

@@ -407,7 +407,9 @@ TEST(Store, OneClientAtATime) {
   }
   EXPECT_EQ(arm.run(Command::confirm, 0, 2), Answer::wrong_state);
   EXPECT_EQ(arm.run(Command::commit, 0, 1), Answer::accepted);
-  for (int c = 1; c <= 8; ++c) EXPECT_EQ(arm.run(static_cast<Command>(c), 100, 1), Answer::busy) << c;
+  // Its own client may still give it up: nothing is written yet (authority_test.cpp).
+  for (const int c : {1, 2, 3, 4, 5, 6, 8})
+    EXPECT_EQ(arm.run(static_cast<Command>(c), 100, 1), Answer::busy) << c;
   arm.settle();
   EXPECT_EQ(arm.sequence(), 1U);
   EXPECT_EQ(arm.run(static_cast<Command>(99)), Answer::unknown_command);

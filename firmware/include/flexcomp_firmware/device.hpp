@@ -115,7 +115,7 @@ class Device {
   wire::Status status() const;
 
   /// Store::set_trust(): before boot().
-  void set_trust(const Trust& trust) { store_.set_trust(trust); }
+  bool set_trust(const Trust& trust) { return store_.set_trust(trust); }
   /// Unit record.
   wire::UnitRecord unit() const;
 

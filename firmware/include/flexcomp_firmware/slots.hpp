@@ -29,8 +29,9 @@
 ///
 /// A set on trial has no seal until it is confirmed. Rollback commits the other set anew, then erases the slot that it leaves.
 ///
-/// The counter is the highest of a signature that was accepted until then (flexcomp/signature.hpp). It outlasts each erase, as
-/// one of the slots always keeps a seal or marks that have it.
+/// The counter is the highest of a signature that was accepted until then (flexcomp/signature.hpp). It outlasts each erase: where
+/// only the slot that is to be erased has it, a mark of generation 0, which voids nothing, takes it into the other one before. Where that has
+/// no place left (after some ten trials that all ended without a confirm) the announcement after the erase is the first to have it.
 #ifndef FLEXCOMP_FIRMWARE_SLOTS_HPP
 #define FLEXCOMP_FIRMWARE_SLOTS_HPP
 
@@ -104,8 +105,10 @@ class Slots {
     return storage_.write != nullptr ? storage_.write(storage_.user, slot, offset, from, size)
                                      : StorageResult::failed;
   }
-  /// Erases a slot, marks and all.
+  /// Erases a slot, marks and all; the other one has the counter then.
   StorageResult erase(unsigned slot);
+  /// Writes the counter into a slot, where it is not there yet. Without a place left nothing is written.
+  StorageResult keep_counter(unsigned slot);
 
   /// What the seals of both slots say, and their marks. At the start, before anything else.
   void survey(std::array<StoredSet, 2>& found);
@@ -118,7 +121,7 @@ class Slots {
   /// Generation of the commit that was begun in a slot, whose image may be there; 0: none.
   std::uint32_t begun(unsigned slot) const;
   /// One mark that voids the other slot's set, of any generation there has been.
-  StorageResult add_mark(unsigned slot);
+  StorageResult add_mark(unsigned slot) { return add_mark(slot, generation_); }
   /// Marks in the other slot that void a set.
   unsigned marks_against(const StoredSet& set) const;
   /// True where no marks void a set: one does not void what two seals say.
@@ -133,6 +136,7 @@ class Slots {
   void note_generation(std::uint32_t seen) {
     if (seen > generation_) generation_ = seen;
   }
+  std::uint32_t generation() const { return generation_; }  ///< highest one so far
   std::uint64_t counter() const { return counter_; }  ///< highest one that a seal, mark or announcement has
   /// Takes a counter into account; what is written from now on has it.
   void note_counter(std::uint64_t seen) {
@@ -141,6 +145,9 @@ class Slots {
 
  private:
   static constexpr unsigned most_marks = 14;
+  static constexpr unsigned most_notes = 8;  ///< the other places are for marks that void a set
+  StorageResult add_mark(unsigned slot, std::uint32_t generation);
+  void note_counter_in(unsigned slot, std::uint64_t seen);
   bool read_unit(unsigned slot, std::uint32_t offset, std::uint8_t* unit) const;
   StorageResult write_unit(unsigned slot, std::uint32_t offset, const std::uint8_t* unit) const;
   void make_unit(const std::uint8_t* magic, std::uint32_t generation, std::uint8_t* unit) const;
@@ -155,6 +162,7 @@ class Slots {
   std::array<Marks, 2> marks_{};
   std::uint32_t generation_ = 0;  ///< highest that a seal, an announcement or a mark has had
   std::uint64_t counter_ = 0;
+  std::array<std::uint64_t, 2> counter_in_{};  ///< highest one in each slot
 };
 
 }  // namespace firmware

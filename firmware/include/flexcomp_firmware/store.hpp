@@ -57,8 +57,9 @@ class Store {
   /// poll() checks in slices.
   void boot();
 
-  /// From now on only sets that are signed with one of these keys, and bound to this unit, are used. Before boot().
-  void set_trust(const Trust& trust);
+  /// From now on only sets that are signed with one of these keys, and bound to this unit, are used. False, and nothing is changed,
+  /// after boot().
+  bool set_trust(const Trust& trust);
 
   /// Runs one command of the wire; its answer is also in status(). `is_authorised`: also rollback and restore_defaults, for which
   /// a client other than `nobody` needs an unlock or a signed command.
@@ -109,6 +110,7 @@ class Store {
     none,
     load,           ///< rollback: read the set in the other slot
     check,          ///< verify, commit, rollback: the image in the staging memory, in slices
+    keep_counter,   ///< of a signed command, before it holds
     check_active,   ///< commit, rollback: the set in use is still what it was
     erase,          ///< the slot that is not in use
     announce,       ///< the generation, before the image
@@ -173,6 +175,8 @@ class Store {
   bool is_in_staging(const StoredSet& set) const;
   /// A check that no commit waits for; its client may give it up.
   bool is_verifying() const { return job_ == Job::check && purpose_ == Purpose::verify; }
+  /// A check after which nothing has been written yet.
+  bool is_checking() const { return job_ == Job::check && purpose_ != Purpose::rollback; }
   void fail();
   void finish(wire::Answer a);
   void make_active(const StoredSet& set);
@@ -218,6 +222,7 @@ class Store {
 
   Trust trust_{};
   SignatureCheck signature_{};
+  std::uint32_t signature_since_ms_ = 0;
   /// Who may roll back or restore once.
   struct Permission {
     Origin origin = nobody;
@@ -225,10 +230,13 @@ class Store {
     std::uint32_t challenge = 0;                  ///< number that an unlock has to repeat
     bool is_given = false;                        ///< it was repeated, or the command was signed
     std::uint32_t since_ms = 0;
+    std::uint32_t active_crc = 0;  ///< of the set that it ends
   };
   Permission permission_{};
   std::uint32_t challenges_ = 0;  ///< so far
 
+  bool has_booted_ = false;
+  bool has_polled_ = false;
   std::uint32_t now_ms_ = 0;    ///< of the last poll
   std::uint32_t began_ms_ = 0;  ///< the owner's first begin
   Origin last_owner_ = nobody;  ///< who staged last
