@@ -196,6 +196,8 @@ def undisturbed(report, shift):
 def no_jump(c):
     """With a command that stands still, every change of the corrected command is the change of set."""
     c.console.ask("s")
+    # What the last restore on the move left may still be on its way to 0.
+    c.load_until(lambda r: r["flags"] & SETTLING == 0, "at rest")
     steps = (("a first set", lambda: c.push(0)), ("another set", lambda: c.push(1)), ("rollback", lambda: c.run(ROLLBACK)),
              ("another set again", lambda: c.push(1)), ("restore defaults", lambda: c.run(RESTORE)))
     for what, change in steps:

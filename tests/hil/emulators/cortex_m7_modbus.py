@@ -35,7 +35,7 @@ def judge_by_pymodbus(status, image):
 
     for function in (client.read_holding_registers, client.read_input_registers):
         record = reads(0x0000, 64, function)
-        check(record[:6] == b"\x01\x00\x00\x06\x00\x08", "protocol 1.0, six joints, double", record.hex())
+        check(record[:6] == b"\x01\x01\x00\x06\x00\x08", "protocol 1.1, six joints, double", record.hex())
         check(record[40:104].hex() == status["nominal_hash"] + status["name_hash"], "both hashes", record.hex())
         check(struct.unpack(">II", record[28:36]) == (1000, 66675), "the cycle, and the cycles in which a change of set settles", record.hex())
     record = reads(0x0040, 48)
