@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who may send a set, roll back and restore: signatures, serial numbers, unlock, turns. Ed25519 is OpenSSL's.
+#include <gtest/gtest.h>
 #include <openssl/evp.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
+#include <random>
 
 #include "bench.hpp"
 #include "flexcomp/signature.hpp"

@@ -43,6 +43,7 @@ constexpr std::size_t longest_copied_record() {
 /// Server of one SDO channel. To the store it is the client `origin`.
 class SdoServer {
  public:
+  /// Of this node, which must outlive it.
   SdoServer(CanopenNode& node, Origin origin) : node_(node), origin_(origin) {}
   SdoServer(const SdoServer&) = delete;
   SdoServer& operator=(const SdoServer&) = delete;

@@ -146,6 +146,7 @@ constexpr bool is_mapped(const Object& o) {
   return false;
 }
 
+/// Number of objects that the TPDO carries.
 constexpr std::size_t mapped_count() {
   std::size_t count = 0;
   for (const Object& o : objects) count += is_mapped(o) ? 1U : 0U;
