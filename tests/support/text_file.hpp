@@ -41,7 +41,7 @@ inline std::string path_of(const std::string& name) {
 }
 
 inline std::string write(const std::string& name, const std::string& content) {
-  const std::string path = path_of(name);
+  std::string path = path_of(name);
   std::ofstream(path, std::ios::binary) << content;
   return path;
 }

@@ -36,7 +36,7 @@ Array array_of(const std::string& hex) {
 
 /// A private file with this content.
 std::string secret(const std::string& name, const std::string& content) {
-  const std::string path = support::write(name, content);
+  std::string path = support::write(name, content);
   EXPECT_EQ(::chmod(path.c_str(), 0600), 0);
   return path;
 }
