@@ -153,9 +153,11 @@ StorageResult Slots::add_mark(unsigned slot, std::uint32_t generation) {
   return StorageResult::failed;
 }
 
-std::uint32_t Slots::begun(unsigned slot) const {
+std::uint32_t Slots::begun(unsigned slot) {
   std::uint8_t unit[unit_bytes];
-  return read_unit(slot, begin_offset, unit) && is_whole(unit, begin_magic) ? load_u32(unit + 4) : 0U;
+  if (!read_unit(slot, begin_offset, unit) || !is_whole(unit, begin_magic)) return 0;
+  note_counter_in(slot, load_u64(unit + 8));
+  return load_u32(unit + 4);
 }
 
 bool Slots::is_counted(const StoredSet& set) const {
@@ -190,9 +192,7 @@ void Slots::survey(std::array<StoredSet, 2>& found) {
   }
   for (unsigned slot = 0; slot < 2; ++slot) {
     read_marks(slot);
-    std::uint8_t unit[unit_bytes];
-    if (read_unit(slot, begin_offset, unit) && is_whole(unit, begin_magic))
-      note_counter_in(slot, load_u64(unit + 8));
+    begun(slot);
   }
 }
 

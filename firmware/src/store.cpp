@@ -456,13 +456,13 @@ bool Store::must_wait(Origin origin) {
   const bool is_free = state_ == StoreState::idle || owns(origin);
   const bool has_stalled =
       (!touched_ && passed(touched_ms_) >= silent_ms) || passed(began_ms_) >= settings_.staging_timeout_ms;
-  if (is_free ? waiting_ != nobody && waiting_ != origin && origin == last_owner_ : !has_stalled) {
-    if (is_free) {
-      release();
-    } else {
-      waiting_ = origin;
-      waiting_ms_ = now_ms_;
-    }
+  if (is_free && waiting_ != nobody && waiting_ != origin && origin == last_owner_) {
+    release();
+    return true;
+  }
+  if (!is_free && !has_stalled) {
+    waiting_ = origin;
+    waiting_ms_ = now_ms_;
     return true;
   }
   if (waiting_ == origin) waiting_ = nobody;

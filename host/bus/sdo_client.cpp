@@ -254,15 +254,30 @@ void SdoClient::throw_if_ours(const Payload& answer, const Expected& expected) {
   ++(same_object ? disturbances_.doubled : disturbances_.foreign);
 }
 
+SdoClient::Repetition SdoClient::repetition() const {
+  const auto wait = std::max(timeout_ / 12, milliseconds(1));
+  return {answer_end(), wait, steady_clock::now() + wait};
+}
+
+void SdoClient::send_when_due(const Payload& frame, Repetition& when, bool is_heard, ObjectAddress object) {
+  // Answers to others do not stop the clock.
+  const auto now = steady_clock::now();
+  if (is_heard && now < when.next()) return;
+  if (now >= when.end) give_up(object);
+  ++disturbances_.lost;
+  send(frame, when.end);
+  when.wait *= 2;
+  when.again = now + when.wait;
+}
+
 SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& expected, bool once) {
   const ObjectAddress object = expected.object;
-  const auto end = once ? steady_clock::now() + timeout_ / 4 : answer_end();
-  auto wait = std::max(timeout_ / 12, milliseconds(1));
-  auto again = once ? end : steady_clock::now() + wait;
-  send(request, end);
+  Repetition when = repetition();
+  if (once) when.end = when.again = steady_clock::now() + timeout_ / 4;
+  send(request, when.end);
   Payload answer;
   for (;;) {
-    const bool is_heard = receive(answer, std::min(again, end));
+    const bool is_heard = receive(answer, when.next());
     if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, expected);
     } else if (is_heard) {
@@ -281,14 +296,7 @@ SdoClient::Payload SdoClient::exchange(const Payload& request, const Expected& e
           abort(object, co::abort::toggle);
       }
     }
-    // Answers to others do not stop the clock.
-    const auto now = steady_clock::now();
-    if (is_heard && now < std::min(again, end)) continue;
-    if (now >= end) give_up(object);
-    ++disturbances_.lost;
-    send(request, end);
-    wait *= 2;
-    again = now + wait;
+    send_when_due(request, when, is_heard, object);
   }
 }
 
@@ -420,12 +428,10 @@ std::size_t SdoClient::send_sub_block(std::span<const std::uint8_t> data, std::s
 /// answer. Where the server alternates between two sizes, an answer equal to the one before is a copy of it.
 SdoClient::Payload SdoClient::await_taken(ObjectAddress object, const Payload& last_segment, unsigned sent,
                                           bool alternates) {
-  const auto end = answer_end();
-  auto wait = std::max(timeout_ / 12, milliseconds(1));
-  auto again = steady_clock::now() + wait;
+  Repetition when = repetition();
   Payload answer;
   for (;;) {
-    const bool is_heard = receive(answer, std::min(again, end));
+    const bool is_heard = receive(answer, when.next());
     if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, {.object = object, .first = false});
     } else if (is_heard) {
@@ -436,13 +442,7 @@ SdoClient::Payload SdoClient::await_taken(ObjectAddress object, const Payload& l
       }
       ++((answer[0] & specifier_mask) == block_upload ? disturbances_.doubled : disturbances_.foreign);
     }
-    const auto now = steady_clock::now();
-    if (is_heard && now < std::min(again, end)) continue;
-    if (now >= end) give_up(object);
-    ++disturbances_.lost;
-    send(last_segment, end);
-    wait *= 2;
-    again = now + wait;
+    send_when_due(last_segment, when, is_heard, object);
   }
 }
 
@@ -471,22 +471,18 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
   unsigned taken = 0;  // of this sub-block
   bool complete = false;
   request = {block_upload | block_start};
-  auto wait = std::max(timeout_ / 12, milliseconds(1));
-  auto now = steady_clock::now();
-  auto end = answer_end();
-  auto again = now + wait;
+  Repetition when = repetition();
   const auto take_stock = [&] {
     most = most == co::most_segments ? co::most_segments - 1U : co::most_segments;
     request = {static_cast<std::uint8_t>(block_upload | sub_block_taken), static_cast<std::uint8_t>(taken),
                static_cast<std::uint8_t>(most)};
     taken = 0;
-    send(request, end);
-    again = steady_clock::now() + wait;
+    send(request, when.end);
+    when.again = steady_clock::now() + when.wait;
   };
-  send(request, end);
+  send(request, when.end);
   for (;;) {
-    const bool is_heard = receive(answer, std::min(again, end));
-    now = steady_clock::now();
+    const bool is_heard = receive(answer, when.next());
     if (is_heard && answer[0] == aborted) {
       throw_if_ours(answer, {.object = object, .first = false});
     } else if (is_heard) {
@@ -504,25 +500,21 @@ std::optional<std::vector<std::uint8_t>> SdoClient::upload_block(ObjectAddress o
           if (out.size() >= longest_here + in_segment) abort(object, co::abort::too_long);
           complete = last;
           if (progress) progress(std::min(out.size(), longest_here), is_announced ? announced : out.size());
-          wait = std::max(timeout_ / 12, milliseconds(1));
-          end = answer_end();
-          again = now + wait;
+          when = repetition();
         } else if (number <= taken) {
           ++disturbances_.doubled;
         }
         if (last || number == most) take_stock();
-        now = steady_clock::now();
       }
     }
-    if (is_heard && now < std::min(again, end)) continue;
-    if (now >= end) give_up(object);
-    ++disturbances_.lost;
-    if (taken != 0) {
+    // Where some segments have come, the others are asked for.
+    const auto now = steady_clock::now();
+    const bool is_due = !is_heard || now >= when.next();
+    if (is_due && taken != 0 && now < when.end) {
+      ++disturbances_.lost;
       take_stock();
     } else {
-      send(request, end);
-      wait *= 2;
-      again = now + wait;
+      send_when_due(request, when, is_heard, object);
     }
   }
   const std::size_t unused = (answer[0] >> 2U) & 7U;

@@ -3,6 +3,7 @@
 /// Client of a CANopen SDO channel (CiA 301, 7.2.4): expedited, segmented and block transfers over a CAN socket.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -118,6 +119,16 @@ class SdoClient {
   bool receive(Payload& payload, std::chrono::steady_clock::time_point end);
   void drain();
   void begin_transfer(std::size_t bytes);
+  /// When a frame is sent once more, at intervals that grow, and until when its answer is waited for.
+  struct Repetition {
+    std::chrono::steady_clock::time_point end;
+    std::chrono::milliseconds wait;
+    std::chrono::steady_clock::time_point again;
+    std::chrono::steady_clock::time_point next() const { return std::min(again, end); }
+  };
+  Repetition repetition() const;
+  /// Sends a frame once more where its time has come. \throws SdoTimeout  where that of its answer has gone
+  void send_when_due(const Payload& frame, Repetition& when, bool is_heard, ObjectAddress object);
   /// Until when an answer is waited for.
   std::chrono::steady_clock::time_point answer_end() const;
   [[noreturn]] void abort(ObjectAddress object, std::uint32_t code);

@@ -24,10 +24,9 @@ namespace {
 /// The first 64 bits of a file's SHA-256 in hexadecimal; empty for no file.
 std::string fingerprint(const std::string& path) {
   if (path.empty()) return "";
-  Sha256 sha;
-  for (const char c : read_file(path)) sha.update(static_cast<std::uint8_t>(c));
+  const std::string content = read_file(path);
   std::string hex;
-  for (const std::uint8_t byte : sha.finish()) hex += fmt::format("{:02x}", byte);
+  for (const std::uint8_t byte : sha256(content.data(), content.size())) hex += fmt::format("{:02x}", byte);
   return hex.substr(0, 16);
 }
 

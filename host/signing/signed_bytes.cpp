@@ -16,9 +16,7 @@ using Bytes = std::vector<std::uint8_t>;
 using Message = std::array<std::uint8_t, signing::message_bytes>;
 
 Message message_of(Signed what, std::span<const std::uint8_t> before_signature) {
-  Sha256 sha;
-  for (const std::uint8_t byte : before_signature) sha.update(byte);
-  return signed_message(what, sha.finish());
+  return signed_message(what, sha256(before_signature.data(), before_signature.size()));
 }
 
 bool has_signature(Signed what, std::span<const std::uint8_t> bytes, std::size_t at, const PublicKey& key) {

@@ -69,11 +69,7 @@ inline Sha256Digest nominal_hash(const NominalRobot<N>& robot) {
 }
 
 /// SHA-256 of a name or a serial number given as `size` bytes.
-inline Sha256Digest name_hash(const char* name, std::size_t size) {
-  Sha256 sha;
-  for (std::size_t i = 0; i < size; ++i) sha.update(static_cast<std::uint8_t>(name[i]));
-  return sha.finish();
-}
+inline Sha256Digest name_hash(const char* name, std::size_t size) { return sha256(name, size); }
 
 /// Context of one instant: load, temperature, time and the last motion before the pose (docs/model.md,
 /// section 2).

@@ -76,6 +76,14 @@ class Sha256 {
   std::uint64_t size_ = 0;
 };
 
+/// SHA-256 of `size` bytes, or characters of a text.
+template <class Byte>
+inline std::array<std::uint8_t, 32> sha256(const Byte* bytes, std::size_t size) {
+  Sha256 sha;
+  for (std::size_t k = 0; k < size; ++k) sha.update(static_cast<std::uint8_t>(bytes[k]));
+  return sha.finish();
+}
+
 }  // namespace flexcomp
 
 #endif

@@ -67,9 +67,7 @@ enum class Signed : std::uint8_t {
 
 /// What a public key is called in images: the first 8 bytes of its SHA-256.
 inline std::array<std::uint8_t, signing::key_id_bytes> key_id(const std::uint8_t* public_key) {
-  Sha256 sha;
-  for (std::size_t k = 0; k < signing::key_bytes; ++k) sha.update(public_key[k]);
-  const Sha256Digest digest = sha.finish();
+  const Sha256Digest digest = sha256(public_key, signing::key_bytes);
   std::array<std::uint8_t, signing::key_id_bytes> id{};
   for (std::size_t k = 0; k < id.size(); ++k) id[k] = digest[k];
   return id;

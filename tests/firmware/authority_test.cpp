@@ -30,9 +30,7 @@ class Key {
     EXPECT_EQ(EVP_PKEY_get_raw_public_key(key_.get(), open.data(), &size), 1);
   }
   std::array<std::uint8_t, 64> sign(Signed what, const Bytes& bytes, std::size_t end) const {
-    Sha256 sha;
-    for (std::size_t k = 0; k < end; ++k) sha.update(bytes[k]);
-    const auto message = signed_message(what, sha.finish());
+    const auto message = signed_message(what, sha256(bytes.data(), end));
     std::array<std::uint8_t, 64> signature{};
     std::size_t size = signature.size();
     const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);

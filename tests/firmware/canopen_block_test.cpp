@@ -10,16 +10,14 @@
 #include <optional>
 #include <random>
 
-#include "firmware/bench.hpp"
-#include "flexcomp_firmware/canopen.hpp"
+#include "firmware/canopen_bench.hpp"
 
 namespace flexcomp::firmware::bench {
 namespace {
 
-namespace co = wire::canopen;
 using wire::Answer;
 using wire::Command;
-using BlockFrame = std::array<std::uint8_t, 8>;
+using BlockFrame = SdoFrame;
 
 /// CRC-16 CCITT bit by bit.
 std::uint16_t crc16_by_bits(const Bytes& bytes) {
@@ -32,15 +30,6 @@ std::uint16_t crc16_by_bits(const Bytes& bytes) {
   return static_cast<std::uint16_t>(crc);
 }
 
-BlockFrame block_head(unsigned command, std::uint16_t index, std::uint8_t sub, std::uint32_t data = 0) {
-  BlockFrame f{};
-  f[0] = static_cast<std::uint8_t>(command);
-  store_u16(f.data() + 1, index);
-  f[3] = sub;
-  store_u32(f.data() + 4, data);
-  return f;
-}
-
 /// Segment `number` of a sub-block that begins at `at`.
 BlockFrame segment_of(const Bytes& data, std::size_t at, unsigned number) {
   const std::size_t from = at + std::size_t{7} * (number - 1);
@@ -49,10 +38,6 @@ BlockFrame segment_of(const Bytes& data, std::size_t at, unsigned number) {
   f[0] = static_cast<std::uint8_t>(number | (from + n == data.size() ? 0x80U : 0U));
   std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(from), n, f.begin() + 1);
   return f;
-}
-
-std::uint32_t abort_code_of(const std::vector<BlockFrame>& answers) {
-  return answers.size() == 1 && answers[0][0] == 0x80 ? load_u32(answers[0].data() + 4) : 0;
 }
 
 BlockFrame end_of(const Bytes& data, int wrong_crc = 0, unsigned more_unused = 0) {
@@ -69,12 +54,7 @@ class CanopenBlock : public testing::Test {
 
   CanopenBlock() { poll(0); }
 
-  void poll(std::uint32_t ms) {
-    arm.now_ms += ms;
-    arm.device->store().poll(arm.now_ms);
-    node.poll(arm.now_ms);
-    arm.step();
-  }
+  void poll(std::uint32_t ms) { poll_node(arm, node, ms); }
 
   /// All answers to a request, without polls.
   std::vector<BlockFrame> ask(const BlockFrame& f) {
@@ -103,8 +83,8 @@ class CanopenBlock : public testing::Test {
   /// Begins a download; returns the size of the first sub-block.
   unsigned begin(const Bytes& data, bool sized = true) {
     const BlockFrame r = only(ask(
-        block_head(sized ? 0xC6 : 0xC4, co::image, 1, sized ? static_cast<std::uint32_t>(data.size()) : 0)));
-    EXPECT_EQ(r, block_head(0xA4, co::image, 1, r[4]));
+        sdo_frame(sized ? 0xC6 : 0xC4, co::image, 1, sized ? static_cast<std::uint32_t>(data.size()) : 0)));
+    EXPECT_EQ(r, sdo_frame(0xA4, co::image, 1, r[4]));
     return r[4];
   }
 
@@ -123,15 +103,15 @@ class CanopenBlock : public testing::Test {
   }
 
   void commit() {
-    const BlockFrame save = block_head(0x23, co::store_parameters, 1, co::save_signature);
-    EXPECT_EQ(only(ask(save)), block_head(0x60, co::store_parameters, 1));
+    const BlockFrame save = sdo_frame(0x23, co::store_parameters, 1, co::save_signature);
+    EXPECT_EQ(only(ask(save)), sdo_frame(0x60, co::store_parameters, 1));
     for (int k = 0; k < 100; ++k) poll(1);
   }
 
   /// Uploads; client with this size of sub-block, which it alternates with another one where that is given.
   Bytes upload(std::uint16_t index, std::uint8_t sub, unsigned size, unsigned other = 0) {
-    const BlockFrame r = only(ask(block_head(0xA4, index, sub, size)));
-    EXPECT_EQ(r, block_head(0xC6, index, sub, load_u32(r.data() + 4)));
+    const BlockFrame r = only(ask(sdo_frame(0xA4, index, sub, size)));
+    EXPECT_EQ(r, sdo_frame(0xC6, index, sub, load_u32(r.data() + 4)));
     Bytes out;
     std::vector<BlockFrame> got = ask_all(BlockFrame{0xA3});
     for (;;) {
@@ -196,40 +176,40 @@ TEST_F(CanopenBlock, PushesAndPulls) {
   EXPECT_EQ(upload(0x1008, 0, 127), (Bytes{'f', 'l', 'e', 'x', 'c', 'o', 'm', 'p'}));
   EXPECT_EQ(upload(0x1018, 2, 127), (Bytes{'1', 'X', 'L', 'F'})) << "of one segment";
   // Up to the client's threshold the server answers as without blocks.
-  EXPECT_EQ(only(ask(block_head(0xA0, 0x1018, 2, 0x047F)))[0], 0x43);
-  EXPECT_EQ(only(ask(block_head(0xA0, co::capability, 0, 0xFF7F)))[0], 0x41);
-  EXPECT_EQ(only(ask(block_head(0xA0, co::robot, 0, 0xFF7F)))[0], 0xC6);
+  EXPECT_EQ(only(ask(sdo_frame(0xA0, 0x1018, 2, 0x047F)))[0], 0x43);
+  EXPECT_EQ(only(ask(sdo_frame(0xA0, co::capability, 0, 0xFF7F)))[0], 0x41);
+  EXPECT_EQ(only(ask(sdo_frame(0xA0, co::robot, 0, 0xFF7F)))[0], 0xC6);
   // Without the client's CRC there is none.
-  EXPECT_EQ(only(ask(block_head(0xA0, 0x1018, 2, 0x7F)))[0], 0xC6);
+  EXPECT_EQ(only(ask(sdo_frame(0xA0, 0x1018, 2, 0x7F)))[0], 0xC6);
   ask(BlockFrame{0xA3});
   EXPECT_EQ(only(ask(BlockFrame{0xA2, 1, 1})), (BlockFrame{0xCD, 0, 0}));
 }
 
 TEST_F(CanopenBlock, SmallObjectsComeInBlocksToo) {
-  ask(block_head(0xC6, 0x1017, 0, 2));
+  ask(sdo_frame(0xC6, 0x1017, 0, 2));
   EXPECT_EQ(only(ask(BlockFrame{0x81, 0xF4, 1})), (BlockFrame{0xA2, 1, 62}));
   EXPECT_EQ(only(ask(end_of(Bytes{0xF4, 1}))), BlockFrame{0xA1});
-  EXPECT_EQ(only(ask(block_head(0x40, 0x1017, 0))), block_head(0x4B, 0x1017, 0, 500));
+  EXPECT_EQ(only(ask(sdo_frame(0x40, 0x1017, 0))), sdo_frame(0x4B, 0x1017, 0, 500));
 }
 
 TEST_F(CanopenBlock, AbortCodes) {
   const Bytes image = make_image(arm.robot, 5);
   const auto size = static_cast<std::uint32_t>(image.size());
   const auto code = [this](const BlockFrame& f) { return abort_code_of(ask(f)); };
-  EXPECT_EQ(code(block_head(0xC6, 0x3000, 0, 9)), co::abort::no_object);
-  EXPECT_EQ(code(block_head(0xC6, co::image, 9, 9)), co::abort::no_sub_index);
-  EXPECT_EQ(code(block_head(0xC6, co::image, 2, 9)), co::abort::read_only);
-  EXPECT_EQ(code(block_head(0xC6, co::image, 1, 0)), co::abort::too_short);
-  EXPECT_EQ(code(block_head(0xC6, co::image, 1, staging_bytes + 1)), co::abort::too_long);
-  EXPECT_EQ(code(block_head(0xC6, co::probe, 1, 215)), co::abort::too_short);
-  EXPECT_EQ(code(block_head(0xA4, co::image, 1, 63)), co::abort::write_only);
-  EXPECT_EQ(code(block_head(0xA4, co::image, 2, 63)), co::abort::no_data);
-  EXPECT_EQ(code(block_head(0xA4, co::status, 0, 0)), co::abort::block_size);
-  EXPECT_EQ(code(block_head(0xA4, co::status, 0, 128)), co::abort::block_size);
+  EXPECT_EQ(code(sdo_frame(0xC6, 0x3000, 0, 9)), co::abort::no_object);
+  EXPECT_EQ(code(sdo_frame(0xC6, co::image, 9, 9)), co::abort::no_sub_index);
+  EXPECT_EQ(code(sdo_frame(0xC6, co::image, 2, 9)), co::abort::read_only);
+  EXPECT_EQ(code(sdo_frame(0xC6, co::image, 1, 0)), co::abort::too_short);
+  EXPECT_EQ(code(sdo_frame(0xC6, co::image, 1, staging_bytes + 1)), co::abort::too_long);
+  EXPECT_EQ(code(sdo_frame(0xC6, co::probe, 1, 215)), co::abort::too_short);
+  EXPECT_EQ(code(sdo_frame(0xA4, co::image, 1, 63)), co::abort::write_only);
+  EXPECT_EQ(code(sdo_frame(0xA4, co::image, 2, 63)), co::abort::no_data);
+  EXPECT_EQ(code(sdo_frame(0xA4, co::status, 0, 0)), co::abort::block_size);
+  EXPECT_EQ(code(sdo_frame(0xA4, co::status, 0, 128)), co::abort::block_size);
   // Without a transfer they are about no object; the end of an upload is not answered.
   for (const unsigned first : {0xC1U, 0xA2U, 0xA3U}) {
     EXPECT_EQ(only(ask(BlockFrame{static_cast<std::uint8_t>(first)})),
-              block_head(0x80, 0, 0, co::abort::command));
+              sdo_frame(0x80, 0, 0, co::abort::command));
   }
   EXPECT_TRUE(ask(BlockFrame{0xA1}).empty());
 
@@ -249,11 +229,11 @@ TEST_F(CanopenBlock, AbortCodes) {
   const Bytes shorter(image.begin(), image.end() - 1);
   Bytes longer = image;
   longer.resize((image.size() / 7 + 2) * 7);
-  ask(block_head(0xC6, co::image, 1, size));
+  ask(sdo_frame(0xC6, co::image, 1, size));
   segments(shorter, 63);
   EXPECT_EQ(code(end_of(shorter)), co::abort::too_short);
   // The segments that follow an abort are not answered, each one as another request.
-  ask(block_head(0xC6, co::image, 1, 10 * 7 - 1));
+  ask(sdo_frame(0xC6, co::image, 1, 10 * 7 - 1));
   int answers = 0;
   for (unsigned k = 1; k <= 63; ++k) answers += static_cast<int>(ask(segment_of(longer, 0, k)).size());
   EXPECT_EQ(answers, 1);
@@ -285,7 +265,7 @@ TEST_F(CanopenBlock, AbortCodes) {
   }
   // The client's abort, NMT stop.
   begin(image);
-  EXPECT_TRUE(ask(block_head(0x80, co::image, 1, co::abort::general)).empty());
+  EXPECT_TRUE(ask(sdo_frame(0x80, co::image, 1, co::abort::general)).empty());
   EXPECT_EQ(arm.device->status().state, 0);
   begin(image);
   const std::uint8_t stop[2] = {2, 0};
@@ -299,7 +279,7 @@ TEST_F(CanopenBlock, AbortCodes) {
   ask(end_of(image));
   commit();
   const auto begin_upload = [&] {
-    ask(block_head(0xA4, co::image, 2, 10));
+    ask(sdo_frame(0xA4, co::image, 2, 10));
     return ask_all(BlockFrame{0xA3}).size();
   };
   EXPECT_EQ(begin_upload(), 10U);
@@ -311,7 +291,7 @@ TEST_F(CanopenBlock, AbortCodes) {
   begin_upload();
   EXPECT_EQ(code(BlockFrame{0xA1}), co::abort::command) << "the end before the last segment";
   begin_upload();
-  EXPECT_TRUE(ask(block_head(0x80, co::image, 2, co::abort::general)).empty());
+  EXPECT_TRUE(ask(sdo_frame(0x80, co::image, 2, co::abort::general)).empty());
   EXPECT_EQ(code(BlockFrame{0xA2, 10, 10}), co::abort::command) << "it is over";
   begin_upload();
   ASSERT_EQ(arm.push(make_image(arm.robot, 6, 1, 6)), Answer::accepted);
@@ -337,16 +317,16 @@ TEST_F(CanopenBlock, RefusedWhereTheQueueIsTooShort) {
     CanopenNode other(*arm.device, 2, settings, transmit);
     other.poll(0);
     out.clear();
-    for (const BlockFrame& f : {block_head(0xC4, co::image, 1), block_head(0xA4, co::status, 0, 63)}) {
+    for (const BlockFrame& f : {sdo_frame(0xC4, co::image, 1), sdo_frame(0xA4, co::status, 0, 63)}) {
       other.receive(co::sdo_request_id + node_id, f.data(), 8);
     }
     ASSERT_EQ(out.size(), 2U);
     if (size == 0) {
-      EXPECT_EQ(out[0], block_head(0x80, co::image, 1, co::abort::command));
-      EXPECT_EQ(out[1], block_head(0x80, co::status, 0, co::abort::command));
+      EXPECT_EQ(out[0], sdo_frame(0x80, co::image, 1, co::abort::command));
+      EXPECT_EQ(out[1], sdo_frame(0x80, co::status, 0, co::abort::command));
     } else {
-      EXPECT_EQ(out[0], block_head(0xA4, co::image, 1, std::clamp(size, 3U, 63U)));
-      EXPECT_EQ(out[1], block_head(0xC6, co::status, 0, wire::status_bytes));
+      EXPECT_EQ(out[0], sdo_frame(0xA4, co::image, 1, std::clamp(size, 3U, 63U)));
+      EXPECT_EQ(out[1], sdo_frame(0xC6, co::status, 0, wire::status_bytes));
     }
   }
 }
@@ -360,7 +340,7 @@ TEST_F(CanopenBlock, ContinuesWhenTheQueueHasRoom) {
   node.poll(arm.now_ms);
   EXPECT_EQ(only(sent), BlockFrame{0xA1});
   commit();
-  ask(block_head(0xA4, co::image, 2, 127));
+  ask(sdo_frame(0xA4, co::image, 2, 127));
   room = 0;
   ask(BlockFrame{0xA3});
   Bytes out;
@@ -384,8 +364,8 @@ TEST_F(CanopenBlock, CopiesAreAnsweredAgain) {
     EXPECT_EQ(first, second);
     return first;
   };
-  ask(block_head(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size())));
-  unsigned size = only(twice(block_head(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size()))))[4];
+  ask(sdo_frame(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size())));
+  unsigned size = only(twice(sdo_frame(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size()))))[4];
   for (std::size_t at = 0; at < image.size();) {
     const unsigned count = std::min<unsigned>(size, static_cast<unsigned>((image.size() - at + 6) / 7));
     for (unsigned k = 1; k < count; ++k) EXPECT_TRUE(twice(segment_of(image, at, k)).empty());
@@ -403,7 +383,7 @@ TEST_F(CanopenBlock, CopiesAreAnsweredAgain) {
   EXPECT_EQ(arm.pull(), image);
 
   // An upload by a client that alternates: a copy of its answer while segments go out changes nothing.
-  ask(block_head(0xA4, co::image, 2, 63));
+  ask(sdo_frame(0xA4, co::image, 2, 63));
   ask(BlockFrame{0xA3});
   std::vector<BlockFrame> got = sent;
   ask(BlockFrame{0xA3});
@@ -426,13 +406,13 @@ TEST_F(CanopenBlock, CopiesAreAnsweredAgain) {
 
 TEST_F(CanopenBlock, APollOfASmallObjectLeavesABlockAlone) {
   const Bytes image = make_image(arm.robot, 5);
-  const BlockFrame question = block_head(0x40, 0x1001, 0);
+  const BlockFrame question = sdo_frame(0x40, 0x1001, 0);
   unsigned size = begin(image);
   for (std::size_t at = 0; at < image.size();) {
     const unsigned count = std::min<unsigned>(size, static_cast<unsigned>((image.size() - at + 6) / 7));
     BlockFrame r{};
     for (unsigned k = 1; k <= count; ++k) {
-      EXPECT_EQ(only(ask(question)), block_head(0x4F, 0x1001, 0, 1));
+      EXPECT_EQ(only(ask(question)), sdo_frame(0x4F, 0x1001, 0, 1));
       const auto answers = ask(segment_of(image, at, k));
       if (k == count) r = only(answers);
     }
@@ -440,11 +420,11 @@ TEST_F(CanopenBlock, APollOfASmallObjectLeavesABlockAlone) {
     at += std::size_t{7} * count;
     size = r[2];
   }
-  EXPECT_EQ(only(ask(question)), block_head(0x4F, 0x1001, 0, 1));
+  EXPECT_EQ(only(ask(question)), sdo_frame(0x4F, 0x1001, 0, 1));
   EXPECT_EQ(only(ask(end_of(image))), BlockFrame{0xA1});
   commit();
   // In an upload, between all segments.
-  ask(block_head(0xA4, co::image, 2, 63));
+  ask(sdo_frame(0xA4, co::image, 2, 63));
   std::vector<BlockFrame> got;
   room = 1;
   ask(BlockFrame{0xA3});
@@ -452,7 +432,7 @@ TEST_F(CanopenBlock, APollOfASmallObjectLeavesABlockAlone) {
     got.insert(got.end(), sent.begin(), sent.end());
     room = -1;
     const auto answer = ask(question);
-    ASSERT_EQ(only(answer), block_head(0x4F, 0x1001, 0, 0));
+    ASSERT_EQ(only(answer), sdo_frame(0x4F, 0x1001, 0, 0));
     sent.clear();
     room = 1;
     node.poll(arm.now_ms);
@@ -462,7 +442,7 @@ TEST_F(CanopenBlock, APollOfASmallObjectLeavesABlockAlone) {
   room = -1;
   begin(image);
   ask(segment_of(image, 0, 1));
-  EXPECT_EQ(only(ask(block_head(0x40, co::status, 0)))[0], 0x41);
+  EXPECT_EQ(only(ask(sdo_frame(0x40, co::status, 0)))[0], 0x41);
   EXPECT_EQ(arm.device->status().state, 0);
 }
 
@@ -502,7 +482,7 @@ TEST_F(CanopenBlock, LostDoubledAndLateSegmentsNeverMakeAnotherImage) {
     bool done = false;
     for (int attempt = 0; attempt < 40 && !done; ++attempt) {
       back.clear();
-      pass(block_head(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size())));
+      pass(sdo_frame(0xC6, co::image, 1, static_cast<std::uint32_t>(image.size())));
       if (back.empty() || back[0][0] != 0xA4) continue;
       unsigned size = back[0][4];
       bool lost = false;
@@ -530,7 +510,7 @@ TEST_F(CanopenBlock, LostDoubledAndLateSegmentsNeverMakeAnotherImage) {
     late.clear();
     if (!done) {
       ++given_up;
-      ask(block_head(0x80, co::image, 1));
+      ask(sdo_frame(0x80, co::image, 1));
       arm.run(Command::abort, 0, 1);
       continue;
     }
@@ -547,8 +527,8 @@ TEST_F(CanopenBlock, AnotherClientMayBeginAtAnyPoint) {
     for (unsigned segments = 0; segments < 63; ++segments) {
       begin(image);
       for (unsigned k = 1; k <= segments; ++k) EXPECT_TRUE(ask(segment_of(image, 0, k)).empty());
-      const BlockFrame r = only(ask(block_head(first, co::capability, 0, 63)));
-      EXPECT_EQ(r, block_head(first == 0x40 ? 0x41 : 0xC6, co::capability, 0, wire::capability_bytes));
+      const BlockFrame r = only(ask(sdo_frame(first, co::capability, 0, 63)));
+      EXPECT_EQ(r, sdo_frame(first == 0x40 ? 0x41 : 0xC6, co::capability, 0, wire::capability_bytes));
       EXPECT_EQ(arm.device->status().state, 0);
     }
   }
@@ -572,13 +552,13 @@ TEST_F(CanopenBlock, TwoNodesOfAnArmDoNotMixTheirTransfers) {
   const Bytes image = make_image(arm.robot, 5);
   const unsigned size = begin(image);
   ask(segment_of(image, 0, 1));
-  EXPECT_EQ(abort_code_of(ask_other(block_head(0xC6, co::image, 1, 100))), co::abort::busy);
-  EXPECT_EQ(only(ask_other(block_head(0xA4, co::robot, 0, 63)))[0], 0xC6);
+  EXPECT_EQ(abort_code_of(ask_other(sdo_frame(0xC6, co::image, 1, 100))), co::abort::busy);
+  EXPECT_EQ(only(ask_other(sdo_frame(0xA4, co::robot, 0, 63)))[0], 0xC6);
   ask(segment_of(image, 0, 2));
   EXPECT_EQ(ask_other(BlockFrame{0xA3}).size(), CanopenNode::segments_per_call);
   for (unsigned k = 3; k < size; ++k) EXPECT_TRUE(ask(segment_of(image, 0, k)).empty());
   EXPECT_EQ(only(ask(segment_of(image, 0, size)))[1], size);
-  EXPECT_TRUE(ask_other(block_head(0x80, co::image, 1)).empty());
+  EXPECT_TRUE(ask_other(sdo_frame(0x80, co::image, 1)).empty());
   EXPECT_NE(arm.device->status().state, 0) << "the other's abort is not ours";
 }
 
@@ -615,7 +595,7 @@ TEST_F(CanopenBlock, AnyFramesAreValidInput) {
     if (random() % 8 == 0) poll(random() % 64 == 0 ? 2001 : 1);
   }
   room = -1;
-  ask(block_head(0x80, 0, 0));
+  ask(sdo_frame(0x80, 0, 0));
   EXPECT_EQ(arm.sequence(), 5U);
   EXPECT_EQ(upload(co::image, 2, 63, 62), image);
 }

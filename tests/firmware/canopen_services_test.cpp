@@ -7,31 +7,19 @@
 #include <optional>
 #include <random>
 
-#include "firmware/bench.hpp"
+#include "firmware/canopen_bench.hpp"
 #include "flexcomp/wire/canopen_dictionary.hpp"
-#include "flexcomp_firmware/canopen.hpp"
 
 namespace flexcomp::firmware::bench {
 namespace {
 
-namespace co = wire::canopen;
 using wire::Answer;
 using wire::Command;
-using SdoFrame = std::array<std::uint8_t, 8>;
 
 struct OnTheBus {
   std::uint16_t id;
   Bytes bytes;
 };
-
-SdoFrame sdo(unsigned command, std::uint16_t index, std::uint8_t sub, std::uint32_t data = 0) {
-  SdoFrame f{};
-  f[0] = static_cast<std::uint8_t>(command);
-  store_u16(f.data() + 1, index);
-  f[3] = sub;
-  store_u32(f.data() + 4, data);
-  return f;
-}
 
 /// Segment of a segmented download, `at` bytes into the data.
 SdoFrame download_segment(const Bytes& data, std::size_t at) {
@@ -52,12 +40,7 @@ class CanopenServices : public testing::Test {
 
   CanopenServices() { poll(0); }
 
-  void poll(std::uint32_t ms = 1) {
-    arm.now_ms += ms;
-    arm.device->store().poll(arm.now_ms);
-    node.poll(arm.now_ms);
-    arm.step();
-  }
+  void poll(std::uint32_t ms = 1) { poll_node(arm, node, ms); }
 
   void nmt(std::uint8_t command) {
     const std::uint8_t frame[2] = {command, node_id};
@@ -76,18 +59,14 @@ class CanopenServices : public testing::Test {
     return out;
   }
 
-  static std::uint32_t code(const std::optional<SdoFrame>& f) {
-    return f && (*f)[0] == 0x80 ? load_u32(f->data() + 4) : 0;
-  }
-
   std::uint32_t write(std::uint16_t request, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
                       unsigned size) {
-    return code(ask(request, sdo(0x23U | ((4 - size) << 2U), index, sub, value)));
+    return abort_code_of(ask(request, sdo_frame(0x23U | ((4 - size) << 2U), index, sub, value)));
   }
 
   std::uint32_t read(std::uint16_t request, std::uint16_t index, std::uint8_t sub) {
-    const auto r = ask(request, sdo(0x40, index, sub));
-    EXPECT_TRUE(r && ((*r)[0] & 0xE3U) == 0x43U) << std::hex << index << " " << code(r);
+    const auto r = ask(request, sdo_frame(0x40, index, sub));
+    EXPECT_TRUE(r && ((*r)[0] & 0xE3U) == 0x43U) << std::hex << index << " " << abort_code_of(r);
     if (!r) return 0xDEADBEEF;
     const unsigned unused = (*r)[0] >> 2U & 3U;
     return load_u32(r->data() + 4) & (0xFFFFFFFFU >> 8U * unused);
@@ -131,11 +110,11 @@ TEST_F(CanopenServices, ThereIsNoSecondServerUntilItIsSetUp) {
   for (unsigned id = 1; id < 0x800; ++id) {
     if (id == plc) continue;
     sent.clear();
-    const SdoFrame f = sdo(0x40, co::device_type, 0);
+    const SdoFrame f = sdo_frame(0x40, co::device_type, 0);
     node.receive(static_cast<std::uint16_t>(id), f.data(), 8);
     ASSERT_TRUE(sent.empty()) << std::hex << id;
   }
-  EXPECT_EQ(code(ask(plc, sdo(0x40, co::sdo_channel, 3))), co::abort::no_sub_index);
+  EXPECT_EQ(abort_code_of(ask(plc, sdo_frame(0x40, co::sdo_channel, 3))), co::abort::no_sub_index);
   EXPECT_EQ(write(plc, co::sdo_server, 1, 0x684, 4), co::abort::read_only);
 }
 
@@ -146,7 +125,7 @@ TEST_F(CanopenServices, TheNetworkSetsItUpAsTheStandardHasIt) {
   }
   EXPECT_EQ(write(plc, co::sdo_channel, 1, 0x085, 4), co::abort::value) << "EMCY has it";
   EXPECT_EQ(write(plc, co::sdo_channel, 1, own, 4), 0U);
-  EXPECT_FALSE(ask(own, sdo(0x40, co::device_type, 0))) << "half a channel is none";
+  EXPECT_FALSE(ask(own, sdo_frame(0x40, co::device_type, 0))) << "half a channel is none";
   EXPECT_NE(node.channel_request() & co::not_valid, 0U);
   EXPECT_EQ(write(plc, co::sdo_channel, 2, own, 4), co::abort::value) << "one for both";
   EXPECT_EQ(write(plc, co::sdo_channel, 1, own + 1, 4), co::abort::value) << "changed while valid";
@@ -163,13 +142,14 @@ TEST_F(CanopenServices, TheNetworkSetsItUpAsTheStandardHasIt) {
   EXPECT_EQ(write(plc, co::pdo, 1, 0xC0000000U | own, 4), 0U);
   EXPECT_EQ(write(plc, co::pdo, 1, 0x40000000U | own, 4), co::abort::value);
   // Off again over the channel itself: the answer still comes.
-  EXPECT_EQ(ask(own, sdo(0x23, co::sdo_channel, 1, co::not_valid | own)), sdo(0x60, co::sdo_channel, 1));
-  EXPECT_FALSE(ask(own, sdo(0x40, co::device_type, 0)));
+  EXPECT_EQ(ask(own, sdo_frame(0x23, co::sdo_channel, 1, co::not_valid | own)),
+            sdo_frame(0x60, co::sdo_channel, 1));
+  EXPECT_FALSE(ask(own, sdo_frame(0x40, co::device_type, 0)));
   EXPECT_EQ(write(plc, co::sdo_channel, 1, own, 4), 0U);
   EXPECT_EQ(read(own, co::device_type, 0), 0U);
   nmt(130);
   EXPECT_EQ(read(plc, co::sdo_channel, 1), co::not_valid) << "back to its value at power-on";
-  EXPECT_FALSE(ask(own, sdo(0x40, co::device_type, 0)));
+  EXPECT_FALSE(ask(own, sdo_frame(0x40, co::device_type, 0)));
 }
 
 TEST_F(CanopenServices, TheIntegratorsChannelSurvivesAReset) {
@@ -195,7 +175,7 @@ TEST_F(CanopenServices, TheIntegratorsChannelSurvivesAReset) {
   nmt(129);
   EXPECT_EQ(read(own, co::device_type, 0), 0U);
   nmt(2);
-  EXPECT_FALSE(ask(own, sdo(0x40, co::device_type, 0))) << "stopped";
+  EXPECT_FALSE(ask(own, sdo_frame(0x40, co::device_type, 0))) << "stopped";
 }
 
 TEST_F(CanopenServices, ALongUploadAndAPushDoNotMeet) {
@@ -211,17 +191,17 @@ TEST_F(CanopenServices, ALongUploadAndAPushDoNotMeet) {
       EXPECT_TRUE(got == robot || whole == 0);
       ++whole;
       got.clear();
-      ASSERT_EQ(code(ask(plc, sdo(0x40, co::robot, 0))), 0U);
+      ASSERT_EQ(abort_code_of(ask(plc, sdo_frame(0x40, co::robot, 0))), 0U);
       return;
     }
     const auto s = ask(plc, SdoFrame{static_cast<std::uint8_t>(got.size() / 7 % 2 != 0 ? 0x70 : 0x60)});
-    ASSERT_EQ(code(s), 0U);
+    ASSERT_EQ(abort_code_of(s), 0U);
     got.insert(got.end(), s->begin() + 1, s->begin() + 8 - (((*s)[0] >> 1U) & 7U));
   };
-  ASSERT_EQ(ask(own, sdo(0x21, co::image, 1, static_cast<std::uint32_t>(image.size()))),
-            sdo(0x60, co::image, 1));
+  ASSERT_EQ(ask(own, sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size()))),
+            sdo_frame(0x60, co::image, 1));
   for (std::size_t at = 0; at < image.size(); at += 7) {
-    ASSERT_EQ(code(ask(own, download_segment(image, at))), 0U) << at;
+    ASSERT_EQ(abort_code_of(ask(own, download_segment(image, at))), 0U) << at;
     plc_goes_on();
     poll(30);
   }
@@ -234,12 +214,12 @@ TEST_F(CanopenServices, ALongUploadAndAPushDoNotMeet) {
 TEST_F(CanopenServices, EachChannelIsAClientOfItsOwn) {
   ASSERT_TRUE(node.set_channel(own, co::channel_answer_id + node_id));
   const Bytes image = make_image(arm.robot, 5);
-  ask(own, sdo(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
-  EXPECT_EQ(code(ask(plc, sdo(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())))),
+  ask(own, sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
+  EXPECT_EQ(abort_code_of(ask(plc, sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())))),
             co::abort::busy);
   EXPECT_EQ(run(plc, Command::abort), co::abort::busy);
   for (std::size_t at = 0; at < image.size(); at += 7)
-    ASSERT_EQ(code(ask(own, download_segment(image, at))), 0U);
+    ASSERT_EQ(abort_code_of(ask(own, download_segment(image, at))), 0U);
   EXPECT_EQ(write(plc, co::store_parameters, 1, co::save_signature, 4), co::abort::busy)
       << "what another one has staged";
   EXPECT_EQ(run(plc, Command::commit), co::abort::busy);
@@ -249,11 +229,11 @@ TEST_F(CanopenServices, EachChannelIsAClientOfItsOwn) {
   EXPECT_EQ(read(plc, co::command, 2), static_cast<std::uint32_t>(Command::commit));
   EXPECT_EQ(read(own, co::command, 2), 0U);
   Bytes probe(wire::probe_request_bytes, 0);
-  ask(own, sdo(0x21, co::probe, 1, static_cast<std::uint32_t>(probe.size())));
+  ask(own, sdo_frame(0x21, co::probe, 1, static_cast<std::uint32_t>(probe.size())));
   for (std::size_t at = 0; at < probe.size(); at += 7)
-    ASSERT_EQ(code(ask(own, download_segment(probe, at))), 0U);
+    ASSERT_EQ(abort_code_of(ask(own, download_segment(probe, at))), 0U);
   const auto response = [this](std::uint16_t request) {
-    EXPECT_EQ(code(ask(request, sdo(0x40, co::probe, 2))), 0U);
+    EXPECT_EQ(abort_code_of(ask(request, sdo_frame(0x40, co::probe, 2))), 0U);
     Bytes out;
     for (unsigned t = 0; out.size() < wire::probe_response_bytes; t ^= 0x10U) {
       const auto s = ask(request, SdoFrame{static_cast<std::uint8_t>(0x60U | t)});
@@ -265,12 +245,12 @@ TEST_F(CanopenServices, EachChannelIsAClientOfItsOwn) {
   EXPECT_NE(answered, Bytes(wire::probe_response_bytes, 0));
   EXPECT_EQ(response(plc), Bytes(wire::probe_response_bytes, 0)) << "it has asked nothing";
   // The silence of one does not end the other.
-  ask(plc, sdo(0x40, co::robot, 0));
+  ask(plc, sdo_frame(0x40, co::robot, 0));
   for (int k = 0; k < 30; ++k) {
     poll(100);
     read(own, co::error_register, 0);
   }
-  EXPECT_EQ(code(ask(plc, SdoFrame{0x60})), co::abort::command) << "timed out";
+  EXPECT_EQ(abort_code_of(ask(plc, SdoFrame{0x60})), co::abort::command) << "timed out";
   EXPECT_EQ(run(own, Command::commit), 0U) << "what is staged stays";
   for (int k = 0; k < 100; ++k) poll();
   EXPECT_EQ(arm.sequence(), 5U);
@@ -279,7 +259,7 @@ TEST_F(CanopenServices, EachChannelIsAClientOfItsOwn) {
 TEST_F(CanopenServices, WhatIsUnderWayEndsWithItsChannel) {
   const auto stage_half = [this](std::uint16_t request) {
     const Bytes image = make_image(arm.robot, 5);
-    ask(request, sdo(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
+    ask(request, sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
     ask(request, download_segment(image, 0));
     EXPECT_EQ(arm.device->status().state, 1);
   };
@@ -304,8 +284,8 @@ TEST_F(CanopenServices, WhatIsUnderWayEndsWithItsChannel) {
   EXPECT_EQ(write(plc, co::error_history, 0, 0, 1), 0U) << "ends its own transfer";
   EXPECT_EQ(arm.device->status().state, 0);
   // A block upload over both at once: eight segments of each in one poll, no more.
-  ask(plc, sdo(0xA4, co::robot, 0, 63));
-  ask(own, sdo(0xA4, co::robot, 0, 63));
+  ask(plc, sdo_frame(0xA4, co::robot, 0, 63));
+  ask(own, sdo_frame(0xA4, co::robot, 0, 63));
   full = true;
   node.receive(plc, SdoFrame{0xA3}.data(), 8);
   node.receive(own, SdoFrame{0xA3}.data(), 8);
@@ -335,11 +315,11 @@ TEST_F(CanopenServices, EverySmallObjectComesInABlockAsWell) {
   arm.push(make_image(arm.robot, 5));
   for (const co::Object& o : co::objects) {
     if (o.size == 0 || o.size > 4 || o.access == co::Access::wo) continue;
-    const auto plain = ask(plc, sdo(0x40, o.index, o.sub));
+    const auto plain = ask(plc, sdo_frame(0x40, o.index, o.sub));
     ASSERT_TRUE(plain);
-    const auto first = ask(plc, sdo(0xA4, o.index, o.sub, 63));
-    if (code(plain) != 0) {
-      EXPECT_EQ(code(first), code(plain));
+    const auto first = ask(plc, sdo_frame(0xA4, o.index, o.sub, 63));
+    if (abort_code_of(plain) != 0) {
+      EXPECT_EQ(abort_code_of(first), abort_code_of(plain));
       continue;
     }
     ASSERT_EQ(load_u32(first->data() + 4), o.size) << std::hex << o.index << " " << int{o.sub};
@@ -357,9 +337,10 @@ TEST_F(CanopenServices, NoPdoWithoutBeingAsked) {
   EXPECT_EQ(read(plc, co::pdo, 2), 254U);
   EXPECT_EQ(read(plc, co::pdo, 3), 1000U);
   EXPECT_EQ(read(plc, co::pdo, 5), 0U);
-  EXPECT_EQ(code(ask(plc, sdo(0x40, co::pdo, 4))), co::abort::no_sub_index) << "CiA 301, 7.5.2.37: reserved";
+  EXPECT_EQ(abort_code_of(ask(plc, sdo_frame(0x40, co::pdo, 4))), co::abort::no_sub_index)
+      << "CiA 301, 7.5.2.37: reserved";
   EXPECT_EQ(write(plc, co::pdo, 4, 0, 1), co::abort::no_sub_index);
-  EXPECT_EQ(code(ask(plc, sdo(0x40, co::pdo, 6))), co::abort::no_sub_index);
+  EXPECT_EQ(abort_code_of(ask(plc, sdo_frame(0x40, co::pdo, 6))), co::abort::no_sub_index);
   EXPECT_EQ(read(plc, co::pdo_mapping, 0), 4U);
   EXPECT_EQ(write(plc, co::pdo_mapping, 0, 0, 1), co::abort::read_only) << "the mapping is fixed";
   EXPECT_EQ(write(plc, co::pdo_mapping, 1, 0x20020610, 4), co::abort::read_only);
@@ -446,8 +427,8 @@ TEST_F(CanopenServices, InhibitTimeAndEventTimerOfThePdo) {
   unsigned count = 0;
   Bytes last;
   for (std::uint32_t k = 0; k < 500; ++k) {
-    ask(plc, sdo(0x21, co::image, 1, 100));
-    if (k % 2 != 0) ask(plc, sdo(0x80, co::image, 1, co::abort::general));
+    ask(plc, sdo_frame(0x21, co::image, 1, 100));
+    if (k % 2 != 0) ask(plc, sdo_frame(0x80, co::image, 1, co::abort::general));
     for (const Bytes& b : pdos(1)) {
       EXPECT_GE(arm.now_ms - last_ms, 41U);
       last_ms = arm.now_ms;
@@ -457,7 +438,7 @@ TEST_F(CanopenServices, InhibitTimeAndEventTimerOfThePdo) {
   }
   EXPECT_GE(count, 10U);
   EXPECT_LE(count, 13U);
-  ask(plc, sdo(0x80, co::image, 1, co::abort::general));
+  ask(plc, sdo_frame(0x80, co::image, 1, co::abort::general));
   for (int k = 0; k < 100; ++k) {
     for (const Bytes& b : pdos(1)) last = b;
   }

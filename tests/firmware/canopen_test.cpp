@@ -4,16 +4,14 @@
 #include <array>
 #include <optional>
 
-#include "firmware/bench.hpp"
-#include "flexcomp_firmware/canopen.hpp"
+#include "firmware/canopen_bench.hpp"
 
 namespace flexcomp::firmware::bench {
 namespace {
 
-namespace co = wire::canopen;
 using wire::Answer;
 using wire::Command;
-using Frame = std::array<std::uint8_t, 8>;
+using Frame = SdoFrame;
 
 struct Sent {
   std::uint16_t id;
@@ -26,12 +24,7 @@ class Canopen : public testing::Test {
 
   Canopen() { poll(0); }
 
-  void poll(std::uint32_t ms) {
-    arm.now_ms += ms;
-    arm.device->store().poll(arm.now_ms);
-    node.poll(arm.now_ms);
-    arm.step();
-  }
+  void poll(std::uint32_t ms) { poll_node(arm, node, ms); }
 
   std::optional<Frame> ask(const Frame& f) {
     sent.clear();
@@ -45,25 +38,12 @@ class Canopen : public testing::Test {
     return out;
   }
 
-  static Frame head(unsigned command, std::uint16_t index, std::uint8_t sub, std::uint32_t data = 0) {
-    Frame f{};
-    f[0] = static_cast<std::uint8_t>(command);
-    store_u16(f.data() + 1, index);
-    f[3] = sub;
-    store_u32(f.data() + 4, data);
-    return f;
-  }
-
-  /// The abort code of an answer; 0 for any other answer.
-  static std::uint32_t code(const std::optional<Frame>& f) {
-    return f && (*f)[0] == 0x80 ? load_u32(f->data() + 4) : 0;
-  }
-
   /// Downloads by segments; returns the abort code.
   std::uint32_t download(std::uint16_t index, std::uint8_t sub, const Bytes& data, bool sized = true) {
-    auto r = ask(head(sized ? 0x21 : 0x20, index, sub, sized ? static_cast<std::uint32_t>(data.size()) : 0));
-    if (code(r) != 0) return code(r);
-    EXPECT_EQ(*r, head(0x60, index, sub));
+    auto r =
+        ask(sdo_frame(sized ? 0x21 : 0x20, index, sub, sized ? static_cast<std::uint32_t>(data.size()) : 0));
+    if (abort_code_of(r) != 0) return abort_code_of(r);
+    EXPECT_EQ(*r, sdo_frame(0x60, index, sub));
     unsigned toggle = 0;
     for (std::size_t at = 0; at < data.size(); at += 7) {
       const std::size_t n = std::min<std::size_t>(7, data.size() - at);
@@ -71,7 +51,7 @@ class Canopen : public testing::Test {
       f[0] = static_cast<std::uint8_t>(toggle | ((7 - n) << 1U) | (at + n == data.size() ? 1U : 0U));
       std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), n, f.begin() + 1);
       r = ask(f);
-      if (code(r) != 0) return code(r);
+      if (abort_code_of(r) != 0) return abort_code_of(r);
       EXPECT_EQ(*r, (Frame{static_cast<std::uint8_t>(0x20U | toggle)}));
       toggle ^= 0x10U;
     }
@@ -79,20 +59,20 @@ class Canopen : public testing::Test {
   }
 
   std::uint32_t expedited(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) {
-    return code(ask(head(0x23U | ((4 - size) << 2U), index, sub, value)));
+    return abort_code_of(ask(sdo_frame(0x23U | ((4 - size) << 2U), index, sub, value)));
   }
 
   /// Uploads whatever there is; empty on an abort, whose code is stored.
   Bytes upload(std::uint16_t index, std::uint8_t sub) {
-    auto r = ask(head(0x40, index, sub));
-    last_code = code(r);
+    auto r = ask(sdo_frame(0x40, index, sub));
+    last_code = abort_code_of(r);
     if (last_code != 0) return {};
     if (((*r)[0] & 2U) != 0) return {r->begin() + 4, r->begin() + 8 - (((*r)[0] >> 2U) & 3U)};
     const std::uint32_t size = load_u32(r->data() + 4);
     Bytes out;
     for (unsigned toggle = 0;; toggle ^= 0x10U) {
       r = ask(Frame{static_cast<std::uint8_t>(0x60U | toggle)});
-      last_code = code(r);
+      last_code = abort_code_of(r);
       if (last_code != 0) return {};
       EXPECT_EQ((*r)[0] & 0xF0U, toggle);
       out.insert(out.end(), r->begin() + 1, r->begin() + 8 - (((*r)[0] >> 1U) & 7U));
@@ -162,10 +142,10 @@ TEST_F(Canopen, BootUpHeartbeatAndNmt) {
   EXPECT_EQ(beat(), 5);
   nmt(2, 0);
   EXPECT_EQ(beat(), 4);
-  EXPECT_FALSE(ask(head(0x40, 0x1000, 0))) << "no SDO when stopped";
+  EXPECT_FALSE(ask(sdo_frame(0x40, 0x1000, 0))) << "no SDO when stopped";
   nmt(128, 0);
   EXPECT_EQ(beat(), 127);
-  EXPECT_TRUE(ask(head(0x40, 0x1000, 0)));
+  EXPECT_TRUE(ask(sdo_frame(0x40, 0x1000, 0)));
   nmt(77, 0);
   EXPECT_EQ(beat(), 127);
   expedited(0x1017, 0, 0, 2);
@@ -175,7 +155,7 @@ TEST_F(Canopen, BootUpHeartbeatAndNmt) {
   for (const std::uint8_t cs : {std::uint8_t{129}, std::uint8_t{130}}) {
     nmt(cs, node_id);
     sent.clear();
-    EXPECT_FALSE(ask(head(0x40, 0x1000, 0))) << "not before the boot-up message";
+    EXPECT_FALSE(ask(sdo_frame(0x40, 0x1000, 0))) << "not before the boot-up message";
     poll(1);
     ASSERT_EQ(sent.size(), 1U);
     EXPECT_EQ(sent[0].bytes, Bytes{0});
@@ -201,15 +181,15 @@ TEST_F(Canopen, MandatoryObjects) {
 }
 
 TEST_F(Canopen, AbortCodes) {
-  EXPECT_EQ(code(ask(head(0x40, 0x3000, 0))), co::abort::no_object);
-  EXPECT_EQ(code(ask(head(0x40, 0x1018, 5))), co::abort::no_sub_index);
-  EXPECT_EQ(code(ask(head(0x40, co::image, 1))), co::abort::write_only);
-  EXPECT_EQ(code(ask(head(0x40, co::image, 2))), co::abort::no_data);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, 0x3000, 0))), co::abort::no_object);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, 0x1018, 5))), co::abort::no_sub_index);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, co::image, 1))), co::abort::write_only);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, co::image, 2))), co::abort::no_data);
   EXPECT_EQ(expedited(0x1000, 0, 1, 4), co::abort::read_only);
   EXPECT_EQ(expedited(0x3000, 0, 1, 4), co::abort::no_object);
   EXPECT_EQ(expedited(0x1017, 0, 1, 4), co::abort::too_long);
   EXPECT_EQ(expedited(0x1017, 0, 1, 1), co::abort::too_short);
-  EXPECT_EQ(code(ask(head(0x22, 0x1017, 0, 500))), 0U) << "size not indicated";
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x22, 0x1017, 0, 500))), 0U) << "size not indicated";
   EXPECT_EQ(number(0x1017, 0), 500U);
   EXPECT_EQ(expedited(0x1010, 1, 0x11111111, 4), co::abort::not_stored);
   EXPECT_EQ(expedited(0x1011, 1, 0x11111111, 4), co::abort::not_stored);
@@ -218,35 +198,35 @@ TEST_F(Canopen, AbortCodes) {
   EXPECT_EQ(command(Command::rollback), co::abort::local_control) << "not unlocked";
   unlock();
   EXPECT_EQ(command(Command::rollback), co::abort::device_state) << "nothing to go back to";
-  EXPECT_EQ(code(ask(head(0xE0, 0, 0))), co::abort::command);
-  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
-  EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
-  EXPECT_FALSE(ask(head(0x80, 0, 0))) << "an abort is not answered";
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0xE0, 0, 0))), co::abort::command);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00})), co::abort::command) << "a segment without a transfer";
+  EXPECT_EQ(abort_code_of(ask(Frame{0x60})), co::abort::command);
+  EXPECT_FALSE(ask(sdo_frame(0x80, 0, 0))) << "an abort is not answered";
 
   // Toggle.
-  ask(head(0x21, co::image, 1, 100));
-  EXPECT_EQ(code(ask(Frame{0x10})), co::abort::toggle);
-  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::command) << "the transfer is over";
+  ask(sdo_frame(0x21, co::image, 1, 100));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x10})), co::abort::toggle);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00})), co::abort::command) << "the transfer is over";
   EXPECT_EQ(arm.device->status().state, 0);
-  ask(head(0x40, co::status, 0));
-  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::toggle);
+  ask(sdo_frame(0x40, co::status, 0));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x70})), co::abort::toggle);
 
   // Lengths.
-  EXPECT_EQ(code(ask(head(0x21, co::image, 1, staging_bytes + 1))), co::abort::too_long);
-  EXPECT_EQ(code(ask(head(0x21, co::image, 1, 0))), co::abort::too_short);
-  ask(head(0x21, co::image, 1, 5));
-  EXPECT_EQ(code(ask(Frame{0x00})), co::abort::too_long);
-  ask(head(0x21, co::image, 1, 50));
-  EXPECT_EQ(code(ask(Frame{0x01})), co::abort::too_short);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x21, co::image, 1, staging_bytes + 1))), co::abort::too_long);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x21, co::image, 1, 0))), co::abort::too_short);
+  ask(sdo_frame(0x21, co::image, 1, 5));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00})), co::abort::too_long);
+  ask(sdo_frame(0x21, co::image, 1, 50));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x01})), co::abort::too_short);
   EXPECT_EQ(download(co::image, 1, Bytes(staging_bytes + 1), false), co::abort::too_long);
   EXPECT_EQ(arm.device->status().state, 0) << "nothing is left behind";
-  EXPECT_EQ(code(ask(head(0x21, co::probe, 1, 215))), co::abort::too_short);
-  EXPECT_EQ(code(ask(head(0x21, co::probe, 1, 217))), co::abort::too_long);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x21, co::probe, 1, 215))), co::abort::too_short);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x21, co::probe, 1, 217))), co::abort::too_long);
   EXPECT_EQ(download(co::probe, 1, Bytes(215), false), co::abort::too_short);
   EXPECT_EQ(download(co::probe, 1, Bytes(600), false), co::abort::too_long);
 
   // Timeout.
-  ask(head(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x21, co::image, 1, 100));
   poll(1);
   sent.clear();
   poll(2000);
@@ -287,7 +267,7 @@ TEST_F(Canopen, RefusalsOfASet) {
   EXPECT_EQ(refused(make_image(arm.robot, 1, 1000)), co::abort::value_too_high) << "implausible";
   EXPECT_EQ(refused(make_image(arm.robot, 0)), co::abort::value_too_low) << "sequence";
   EXPECT_EQ(arm.stage(good, 2), Answer::accepted);
-  EXPECT_EQ(code(ask(head(0x21, co::image, 1, 100))), co::abort::busy);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x21, co::image, 1, 100))), co::abort::busy);
   EXPECT_EQ(command(Command::commit), co::abort::busy);
   arm.run(Command::abort, 0, 2);
   EXPECT_EQ(refused(good), 0U);
@@ -318,10 +298,10 @@ TEST_F(Canopen, PushPullAndProbe) {
   for (std::size_t j = 0; j < joints; ++j) EXPECT_EQ(answer.q_rad[j], to_binary64_bits(expected.q[j]));
 
   // A set that changes during an upload ends it.
-  ask(head(0x40, co::image, 2));
-  EXPECT_EQ(code(ask(Frame{0x60})), 0U);
+  ask(sdo_frame(0x40, co::image, 2));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x60})), 0U);
   ASSERT_EQ(arm.push(make_image(arm.robot, 6, 1, 6)), Answer::accepted);
-  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::device_state);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x70})), co::abort::device_state);
 
   unlock();
   EXPECT_EQ(command(Command::rollback), 0U);
@@ -379,8 +359,8 @@ TEST_F(Canopen, EmergenciesForFaultsThatComeAndGo) {
   EXPECT_EQ(expedited(0x1003, 1, 0, 4), co::abort::read_only);
   EXPECT_EQ(expedited(0x1003, 0, 0, 1), 0U);
   EXPECT_EQ(number(0x1003, 0), 0U);
-  EXPECT_EQ(code(ask(head(0x40, 0x1003, 1))), co::abort::no_data);
-  EXPECT_EQ(code(ask(head(0x40, 0x1003, 9))), co::abort::no_sub_index);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, 0x1003, 1))), co::abort::no_data);
+  EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, 0x1003, 9))), co::abort::no_sub_index);
 
   // A trial that nobody confirms: the fault is there while EMCY is off, then it is told; stopped nodes say nothing.
   EXPECT_EQ(expedited(0x1014, 0, 0x80000085U, 4), 0U);
@@ -525,7 +505,7 @@ TEST_F(Canopen, CommunicationParametersAreStoredWhereThereIsMemory) {
                        }});
     other.set_memory(kept.memory());
     other.poll(0);
-    const Frame f = head(0x40, 0x1017, 0);
+    const Frame f = sdo_frame(0x40, 0x1017, 0);
     other.receive(co::sdo_request_id + node_id, f.data(), 8);
     return answers.empty() ? 0 : load_u16(answers.back().bytes.data() + 4);
   };
@@ -568,14 +548,14 @@ TEST_F(Canopen, TheErrorHistoryKeepsTheNewest) {
 }
 
 TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
-  ask(head(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x21, co::image, 1, 100));
   ask(Frame{0x00});
-  ask(head(0x80, co::image, 1, co::abort::general));
+  ask(sdo_frame(0x80, co::image, 1, co::abort::general));
   EXPECT_EQ(arm.device->status().state, 0);
-  ask(head(0x21, co::image, 1, 100));
-  ask(head(0x40, co::status, 0));  // a new transfer ends the old one
+  ask(sdo_frame(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x40, co::status, 0));  // a new transfer ends the old one
   EXPECT_EQ(arm.device->status().state, 0);
-  ask(head(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x21, co::image, 1, 100));
   const std::uint8_t stop[2] = {2, 0};
   node.receive(0, stop, 2);
   EXPECT_EQ(arm.device->status().state, 0);
@@ -590,15 +570,15 @@ TEST_F(Canopen, AnAbortedDownloadLeavesNothingBehind) {
 TEST_F(Canopen, APollOfASmallObjectLeavesTheTransferAlone) {
   const Bytes image = make_image(arm.robot, 5);
   const auto poll_error_register = [this] {
-    EXPECT_EQ(code(ask(head(0x40, 0x1001, 0))), 0U);
-    EXPECT_EQ(code(ask(head(0x40, co::status_summary, 5))), 0U);
+    EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, 0x1001, 0))), 0U);
+    EXPECT_EQ(abort_code_of(ask(sdo_frame(0x40, co::status_summary, 5))), 0U);
   };
   // Between all segments of a download.
-  EXPECT_EQ(ask(head(0x21, co::image, 1, static_cast<std::uint32_t>(image.size()))),
-            head(0x60, co::image, 1));
+  EXPECT_EQ(ask(sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size()))),
+            sdo_frame(0x60, co::image, 1));
   unsigned toggle = 0;
   for (std::size_t at = 0; at < image.size(); at += 7) {
-    EXPECT_EQ(ask(head(0x40, 0x1001, 0)), head(0x4F, 0x1001, 0, 1)) << "no set yet";
+    EXPECT_EQ(ask(sdo_frame(0x40, 0x1001, 0)), sdo_frame(0x4F, 0x1001, 0, 1)) << "no set yet";
     const std::size_t n = std::min<std::size_t>(7, image.size() - at);
     Frame f{};
     f[0] = static_cast<std::uint8_t>(toggle | ((7 - n) << 1U) | (at + n == image.size() ? 1U : 0U));
@@ -613,22 +593,22 @@ TEST_F(Canopen, APollOfASmallObjectLeavesTheTransferAlone) {
   for (const std::uint16_t index : {co::image, co::robot}) {
     const std::uint8_t sub = index == co::image ? 2 : 0;
     const Bytes expected = upload(index, sub);
-    const auto r = ask(head(0x40, index, sub));
-    ASSERT_EQ(code(r), 0U);
+    const auto r = ask(sdo_frame(0x40, index, sub));
+    ASSERT_EQ(abort_code_of(r), 0U);
     Bytes got;
     for (unsigned t = 0; got.size() < expected.size(); t ^= 0x10U) {
       poll_error_register();
       const auto s = ask(Frame{static_cast<std::uint8_t>(0x60U | t)});
-      ASSERT_EQ(code(s), 0U);
+      ASSERT_EQ(abort_code_of(s), 0U);
       got.insert(got.end(), s->begin() + 1, s->begin() + 8 - (((*s)[0] >> 1U) & 7U));
     }
     EXPECT_EQ(got, expected);
   }
   // A larger object, or a command, ends the transfer as before; polls do not keep alive what its client has left.
-  ask(head(0x21, co::image, 1, 100));
-  ask(head(0x40, 0x1008, 0));
+  ask(sdo_frame(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x40, 0x1008, 0));
   EXPECT_EQ(arm.device->status().state, 0);
-  ask(head(0x21, co::image, 1, 100));
+  ask(sdo_frame(0x21, co::image, 1, 100));
   for (int k = 0; k < 25; ++k) {
     poll(100);
     poll_error_register();
@@ -638,7 +618,7 @@ TEST_F(Canopen, APollOfASmallObjectLeavesTheTransferAlone) {
 
 TEST_F(Canopen, ARepeatedSegmentIsAnsweredAgain) {
   const Bytes image = make_image(arm.robot, 5);
-  ask(head(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
+  ask(sdo_frame(0x21, co::image, 1, static_cast<std::uint32_t>(image.size())));
   unsigned toggle = 0;
   for (std::size_t at = 0; at < image.size(); at += 7) {
     const std::size_t n = std::min<std::size_t>(7, image.size() - at);
@@ -653,27 +633,27 @@ TEST_F(Canopen, ARepeatedSegmentIsAnsweredAgain) {
   EXPECT_EQ(expedited(0x1010, 1, co::save_signature, 4), 0U);
   for (int k = 0; k < 100; ++k) poll(1);
   Bytes got;
-  ask(head(0x40, co::image, 2));
+  ask(sdo_frame(0x40, co::image, 2));
   for (unsigned t = 0; got.size() < image.size(); t ^= 0x10U) {
     const Frame request{static_cast<std::uint8_t>(0x60U | t)};
     const auto s = ask(request);
-    ASSERT_EQ(code(s), 0U);
+    ASSERT_EQ(abort_code_of(s), 0U);
     EXPECT_EQ(ask(request), s);
     EXPECT_EQ(ask(request), s);
     got.insert(got.end(), s->begin() + 1, s->begin() + 8 - (((*s)[0] >> 1U) & 7U));
   }
   EXPECT_EQ(got, image);
   // Another segment with this toggle bit is none of these.
-  ask(head(0x21, co::image, 1, 100));
-  EXPECT_EQ(code(ask(Frame{0x00, 1})), 0U);
-  EXPECT_EQ(code(ask(Frame{0x00, 2})), co::abort::toggle);
-  EXPECT_EQ(code(ask(Frame{0x00, 1})), co::abort::command) << "the transfer is over";
+  ask(sdo_frame(0x21, co::image, 1, 100));
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00, 1})), 0U);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00, 2})), co::abort::toggle);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x00, 1})), co::abort::command) << "the transfer is over";
   // Nor is one that comes long after.
   upload(co::status, 0);
   poll(1);
   poll(2000);
-  EXPECT_EQ(code(ask(Frame{0x60})), co::abort::command);
-  EXPECT_EQ(code(ask(Frame{0x70})), co::abort::command);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x60})), co::abort::command);
+  EXPECT_EQ(abort_code_of(ask(Frame{0x70})), co::abort::command);
 }
 
 TEST_F(Canopen, TellsTheCertificateOfTheActiveSet) {
@@ -698,7 +678,7 @@ TEST_F(Canopen, TellsTheCertificateOfTheActiveSet) {
 
 TEST_F(Canopen, AnswersThatFoundNoRoomComeLater) {
   full = true;
-  EXPECT_FALSE(ask(head(0x40, 0x1000, 0)));
+  EXPECT_FALSE(ask(sdo_frame(0x40, 0x1000, 0)));
   full = false;
   sent.clear();
   poll(1);

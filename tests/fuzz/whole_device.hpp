@@ -669,7 +669,10 @@ class Device {
 
   static unsigned permit(void* self, unsigned command, unsigned is_local) {
     require(command <= 0xFFFF && is_local <= 1, "permit was asked for what is no command");
-    return command < 32 && (static_cast<Device*>(self)->allowed_ >> command & 1U) == 0 ? 0U : 1U;
+    const unsigned allowed = static_cast<Device*>(self)->allowed_;
+    if (command < 32 && (allowed >> command & 1U) == 0) return FLEXCOMP_REFUSE;
+    // Without an unlock, which an input hardly ever guesses; half of the bits ask for it.
+    return command < 16 && (allowed >> (command + 16U) & 1U) != 0 ? FLEXCOMP_AUTHORISE : FLEXCOMP_ALLOW;
   }
   static void log(void*, unsigned event, std::uint32_t) { require(event >= 1, "an event without a number"); }
 

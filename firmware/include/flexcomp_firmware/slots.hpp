@@ -119,7 +119,7 @@ class Slots {
   /// Announces the commit of a generation in an erased slot.
   StorageResult announce(const StoredSet& set);
   /// Generation of the commit that was begun in a slot, whose image may be there; 0: none.
-  std::uint32_t begun(unsigned slot) const;
+  std::uint32_t begun(unsigned slot);
   /// One mark that voids the other slot's set, of any generation there has been.
   StorageResult add_mark(unsigned slot) { return add_mark(slot, generation_); }
   /// Marks in the other slot that void a set.
