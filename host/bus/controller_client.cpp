@@ -153,8 +153,7 @@ std::optional<Robot> ControllerClient::robot() {
         fmt::format("the robot that the controller tells ('{}') does not have the hashes that it tells",
                     out.name));
   }
-  // Which unit it is does not change; its counter does, which is not of the robot.
-  if (const std::optional<ControllerUnit> told = told_unit_ ? told_unit_ : unit()) {
+  if (const std::optional<ControllerUnit> told = unit()) {
     out.serial = told->serial;
     out.nominal.unit_hash = told->hash;
   }
@@ -174,14 +173,14 @@ std::optional<ControllerUnit> ControllerClient::unit() {
   out.keys = record.keys;
   out.key_ids.assign(record.key_ids.begin(),
                      record.key_ids.begin() + std::min<std::ptrdiff_t>(record.keys, wire::listed_keys));
-  if (record.serial_size == 0) return told_unit_ = out;
+  if (record.serial_size == 0) return out;
   out.serial.assign(record.serial.begin(), record.serial.begin() + record.serial_size);
   if (!is_serial(out.serial) || name_hash(out.serial.data(), out.serial.size()) != out.hash) {
     // Not repeated: it may be what makes a terminal do something.
     throw BusError(where_,
                    "the serial number that the controller tells does not have the hash that it tells");
   }
-  return told_unit_ = out;
+  return out;
 }
 
 void ControllerClient::stage(std::span<const std::uint8_t> image, const Progress& progress) {

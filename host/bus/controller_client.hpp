@@ -174,7 +174,6 @@ class ControllerClient {
   ClientOptions options_;
   std::string where_;
   wire::Capability capability_;
-  std::optional<ControllerUnit> told_unit_;  ///< as it was read last
 };
 
 /// Opens the bus and reads the capability of the controller. \throws BusError
