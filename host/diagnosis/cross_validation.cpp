@@ -31,16 +31,20 @@ LeftOutPoses::LeftOutPoses(const std::vector<Observation>& rows) {
   }
 }
 
-double LeftOutPoses::chi2_per_number(const SubsetSearch& search, const Scored& solution) const {
+double LeftOutPoses::chi2_per_number(const SubsetSearch& search, const Scored& solution,
+                                     const ChosenColumns& besides) const {
   const GapSystem& system = search.system();
   const Eigen::Index own = system.nuisance.cols();
   const ChosenColumns added = search.columns_of(solution.blocks);
-  const Eigen::Index count = own + added.columns.cols();
+  const Eigen::Index named = added.columns.cols();
+  const Eigen::Index count = own + named + besides.columns.cols();
   Eigen::MatrixXd all(system.columns.rows(), count);
   all.leftCols(own) = system.nuisance;
-  all.rightCols(count - own) = added.columns;
+  all.middleCols(own, named) = added.columns;
+  if (besides.columns.cols() > 0) all.rightCols(besides.columns.cols()) = besides.columns;
   Eigen::VectorXd precision = Eigen::VectorXd::Constant(count, free_precision);
-  precision.tail(count - own) = added.precision;
+  precision.segment(own, named) = added.precision;
+  precision.tail(besides.precision.size()) = besides.precision;
   Eigen::MatrixXd normal = gram(all);
   normal.diagonal() += precision;
   Eigen::MatrixXd right = all.transpose() * system.residual;

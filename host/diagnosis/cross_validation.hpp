@@ -18,7 +18,9 @@ class LeftOutPoses {
 
   /// Chi-square per measured number on poses that were left out, one after the other (D12): leave-one-out residuals of ridge
   /// regression (Allen, PRESS, 1974; in blocks Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10).
-  double chi2_per_number(const SubsetSearch& search, const Scored& solution) const;
+  /// \param besides  further columns, as columns_of() has them
+  double chi2_per_number(const SubsetSearch& search, const Scored& solution,
+                         const ChosenColumns& besides = {}) const;
 
  private:
   std::vector<std::vector<std::size_t>> poses_;

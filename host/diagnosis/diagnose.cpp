@@ -9,6 +9,7 @@
 
 #include "diagnosis/discriminating_poses.hpp"
 #include "diagnosis/found_effects.hpp"
+#include "diagnosis/remainder.hpp"
 #include "diagnosis/scatter.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/identify.hpp"
@@ -129,7 +130,10 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   Selection selection = search_and_refit(robot, rows, options.columns, start, false, progress, 0.1);
   const SubsetSearch& first = *selection.found.search;
   out.places = place_shares(first.system(), residual_after(first, first.score({})));
-  const bool scatters = selection.found.unnamed &&
+  progress("what no name explains", 0.55);
+  const LeftOutPoses left_out(rows);
+  const std::optional<CurveMaximum> curves = carry_remainder(selection, robot, rows, left_out);
+  const bool scatters = !curves && selection.found.unnamed &&
                         prefer_scatter(selection, robot, rows, start, options.columns, out.places, progress);
 
   progress("how sure it is", 0.7);
@@ -138,7 +142,6 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   compare(out, robot, rows, source, start, refit);
   const ResidualAnalysis left = residual_after(*found.search, found.solution);
   out.places_left = scatters ? place_shares_at(refit, robot, rows) : place_shares(*found.system, left);
-  const LeftOutPoses left_out(rows);
   out.effects = found_effects(robot, selection, left, left_out, options.seed);
   out.steps = steps_of(selection, out.effects, left_out);
   out.not_testable = selection.search->not_testable();

@@ -192,7 +192,7 @@ std::vector<Hypothesis> EffectSearch::hypotheses_of(const SearchResult& result, 
       h.value *= h.function->size_rad;
     } else if (block.is_local()) {
       h.local = scanned.local_fault(block);
-      h.value *= 1e-4;
+      h.value *= curve_unit_rad;
     } else {
       h.parameters = block.fitted;
       h.first_parameter = candidates_.list[block.candidate].first;

@@ -86,7 +86,7 @@ void add_candidates(GapSystem& system, const CandidateSet& all, const Eigen::Mat
     // Every arm bends: what the paper's model has needs no more than its BIC.
     block.margin = descriptor(block.id.effect).in_paper_model ? 0 : least_gain;
     if (candidate.prior_rad > 0) {
-      block.precision = std::pow(1e-4 / candidate.prior_rad, 2);
+      block.precision = std::pow(curve_unit_rad / candidate.prior_rad, 2);
       block.parameters = 0;
     }
     system.blocks.push_back(std::move(block));

@@ -19,6 +19,9 @@ namespace flexcomp::host {
 /// Least gain in BIC at which an effect is named (D4): a little more than decisive, for some two hundred are tried.
 constexpr double least_gain = 12;
 
+/// Unit of the coefficients of a curve's columns.
+constexpr double curve_unit_rad = 1e-4;
+
 /// Above so many rows, searches that take long and that the mass of the rows decides are cut short.
 constexpr std::size_t many_rows = 300;
 

@@ -9,6 +9,7 @@
 #include "flexcomp/forward.hpp"
 #include "identification/fitted_calibration.hpp"
 #include "identification/parameter_selection.hpp"
+#include "linalg/decompositions.hpp"
 #include "model/effects/descriptor.hpp"
 
 namespace flexcomp::host {
@@ -24,14 +25,14 @@ struct CurveParts {
   bool whole = false;  ///< a smooth curve: every coefficient is free
   std::vector<const LocalCurve*> locals;
 
-  bool is_free(std::size_t coefficient) const {
-    if (whole) return true;
+  bool is_local(std::size_t coefficient) const {
     const double at = 2 * pi * static_cast<double>(coefficient) / static_cast<double>(size);
     // All whose knot lies in the inner half of the spline's support.
     return std::ranges::any_of(locals, [&](const LocalCurve* c) {
       return std::abs(angle_difference(at, c->centre_rad)) < 1.5 * 2 * pi / static_cast<double>(c->knots);
     });
   }
+  bool is_free(std::size_t coefficient) const { return whole || is_local(coefficient); }
 };
 
 std::map<unsigned, CurveParts> curves_by_joint(const std::vector<Hypothesis>& hypotheses) {
@@ -60,6 +61,30 @@ struct ExtendedModel {
   void release(std::size_t parameter, const PriorKnowledge& prior) {
     fitted.parameters.push_back(model.parameters[parameter]);
     fitted.prior.push_back(prior);
+  }
+
+  /// A curve with the prior (D19), and that of local faults where there are any.
+  void add_curve(unsigned joint, CurveParts parts, const CurvePrior& curves,
+                 const std::vector<Observation>& rows, const Robot& robot) {
+    parts.size = std::max(parts.size, curve_coefficients);
+    const EffectId id{.effect = Effect::joint_curve, .joint = joint, .coefficients = parts.size};
+    const std::size_t first = model.parameters.size();
+    add_effect(model, id, robot.nominal);
+    if (parts.whole) curve_terms.push_back(model.set.terms.size() - 1);
+    const std::vector<bool> measured = measured_coefficients(rows, joint - 1, parts.size);
+    Eigen::MatrixXd covariance =
+        coefficient_covariance(curves.size_rad[joint - 1], curves.corner, parts.size);
+    std::vector<Eigen::Index> taken;
+    const std::size_t from = fitted.parameters.size();
+    for (std::size_t k = 0; k < parts.size; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      if (parts.is_local(k)) covariance(i, i) += wide_curve_rad * wide_curve_rad;
+      if (!measured[k] && !parts.is_free(k)) continue;
+      taken.push_back(i);
+      release(first + k, {});
+    }
+    const Eigen::MatrixXd own = covariance(taken, taken);
+    fitted.groups.push_back({from, Llt(own).inverse()});
   }
 
   void add_curve(unsigned joint, const CurveParts& parts, const Robot& robot) {
@@ -93,12 +118,24 @@ struct ExtendedModel {
   }
 };
 
-ExtendedModel extended_model(const Robot& robot, const FittedModel& start, const SearchResult& found) {
+ExtendedModel extended_model(const Robot& robot, const std::vector<Observation>& rows,
+                             const FittedModel& start, const SearchResult& found,
+                             const CurveMaximum* curves) {
   ExtendedModel out;
   out.model.set = start.fit.estimate.set;
   out.fitted = start.fitted;
   out.fitted.prior.resize(start.fitted.parameters.size());
-  for (const auto& [joint, parts] : curves_by_joint(found.hypotheses)) out.add_curve(joint, parts, robot);
+  std::map<unsigned, CurveParts> by_joint = curves_by_joint(found.hypotheses);
+  for (unsigned joint = 1; curves != nullptr && joint <= joint_count; ++joint) {
+    if (curves->prior.has(joint - 1)) by_joint[joint];
+  }
+  for (const auto& [joint, parts] : by_joint) {
+    if (curves != nullptr && curves->prior.has(joint - 1)) {
+      out.add_curve(joint, parts, curves->prior, rows, robot);
+    } else {
+      out.add_curve(joint, parts, robot);
+    }
+  }
   for (const Hypothesis& h : found.hypotheses) {
     if (h.id.effect == Effect::joint_curve) continue;
     if (h.function) {
@@ -148,11 +185,17 @@ void centre_curve(TermSet& set, const Term<double>& term, const Robot& robot) {
 
 }  // namespace
 
-Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, const FittedModel& start,
-                  const SearchResult& found) {
+Refit refit_model(const Robot& robot, const std::vector<Observation>& declared, const FittedModel& start,
+                  const SearchResult& found, const CurveMaximum* curves) {
   Refit out;
   const Estimate& at = start.fit.estimate;
-  ExtendedModel extended = extended_model(robot, start, found);
+  std::vector<Observation> rows = declared;
+  for (Observation& row : rows) {
+    if (curves == nullptr) break;
+    row.whitening.topRows<3>() /= curves->position_noise;
+    row.whitening.bottomRows<3>() /= curves->orientation_noise;
+  }
+  ExtendedModel extended = extended_model(robot, rows, start, found, curves);
   EstimatorOptions options{.spectrum = false};
   // On the way to a curve's prior no more than near the minimum.
   if (!extended.curve_ranges.empty()) options.largest_iterations = 8;

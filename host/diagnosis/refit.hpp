@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/hypothesis.hpp"
+#include "diagnosis/joint_curves.hpp"
 #include "identification/estimator.hpp"
 #include "model/calibration.hpp"
 
@@ -27,9 +28,10 @@ struct Refit : FittedModel {
   Calibration calibration;
 };
 
-/// Fits the start's parameters and those of the hypotheses. Curves get a prior of their own size (empirical Bayes, D16);
-/// unnamed functions enter as fixed tables.
+/// Fits the start's parameters and those of the hypotheses; unnamed functions enter as fixed tables.
+/// \param curves  prior of the joints' curves, named or carried, and the noise (D19); null: named curves get a prior of their
+///                own size (empirical Bayes, D16)
 Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, const FittedModel& start,
-                  const SearchResult& found);
+                  const SearchResult& found, const CurveMaximum* curves = nullptr);
 
 }  // namespace flexcomp::host

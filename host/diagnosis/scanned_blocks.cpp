@@ -15,7 +15,6 @@ namespace {
 /// Knots per turn of a local fault of any shape, and the prior standard deviation of its coefficients.
 constexpr std::size_t finest_local = 96;
 constexpr double deep_fault_rad = 5e-4;
-constexpr double curve_unit_rad = 1e-4;
 
 }  // namespace
 

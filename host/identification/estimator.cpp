@@ -8,6 +8,7 @@
 
 #include "distributions.hpp"
 #include "identification/statistics.hpp"
+#include "linalg/blas.hpp"
 #include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
@@ -28,8 +29,9 @@ struct RobustWeights {
 
 /// Robust weights of the rows, Eq. (M39): scale from the median of their chi-squares, which a third of outliers
 /// does not change; weight 1 up to the 99.9 % quantile, quantile / square beyond.
+/// \param fitted  numbers that the fit takes up
 RobustWeights robust_weights(const Eigen::VectorXd& square, const std::vector<Observation>& rows,
-                             std::size_t unknowns) {
+                             double fitted) {
   std::vector<double> ratio(rows.size());
   double measured = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -38,7 +40,7 @@ RobustWeights robust_weights(const Eigen::VectorXd& square, const std::vector<Ob
   }
   RobustWeights out;
   // Fitted parameters take up part of the residual.
-  const double share = std::max(0.05, (measured - static_cast<double>(unknowns)) / measured);
+  const double share = std::max(0.05, (measured - fitted) / measured);
   out.scale = std::sqrt(std::max(median(ratio) / share, 1e-12));
   out.weight.resize(rows.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -113,6 +115,12 @@ Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
   return dx.cwiseMax(q.least);
 }
 
+/// Inverse of a positive semidefinite matrix of which the lower triangle is given; by BLAS where it can be.
+Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& a) {
+  Eigen::MatrixXd factor = a;
+  return factor_in_place(factor) ? inverse_of_factored(factor) : Ldlt(a).inverse();
+}
+
 /// An estimate with its residuals, their derivative and their squares per row.
 struct Point {
   Estimate estimate;
@@ -122,6 +130,12 @@ struct Point {
 
 /// Objective of the fit: robust weighted least squares with priors, Eq. (M34).
 class Objective {
+  struct Group {
+    Eigen::Index first;
+    Eigen::MatrixXd precision;  // in units
+    Eigen::VectorXd of(const Eigen::VectorXd& v) const { return v.segment(first, precision.rows()); }
+  };
+
  public:
   Objective(const Unknowns& unknowns, const std::vector<Observation>& rows, const Robot& robot,
             const TermSet& set)
@@ -137,6 +151,12 @@ class Objective {
       expected_[i] = prior.expected / units_[i];
       if (std::isfinite(prior.tolerance)) precision_[i] = std::pow(units_[i] / prior.tolerance, 2);
     }
+    for (const GroupPrior& group : unknowns.groups) {
+      const Eigen::Index size = group.precision.rows();
+      const auto unit = units_.segment(frames + static_cast<Eigen::Index>(group.first), size);
+      groups_.push_back({frames + static_cast<Eigen::Index>(group.first),
+                         unit.asDiagonal() * group.precision * unit.asDiagonal()});
+    }
   }
 
   Point at(Estimate estimate) const {
@@ -149,7 +169,9 @@ class Objective {
   }
 
   double cost(const Point& point, const std::vector<double>& weight) const {
-    double sum = (values(point.estimate) - expected_).cwiseAbs2().dot(precision_);
+    const Eigen::VectorXd value = values(point.estimate);
+    double sum = (value - expected_).cwiseAbs2().dot(precision_);
+    for (const Group& g : groups_) sum += g.of(value).dot(g.precision * g.of(value));
     for (std::size_t k = 0; k < rows_.size(); ++k)
       sum += weight[k] * point.square[static_cast<Eigen::Index>(k)];
     return sum;
@@ -175,9 +197,28 @@ class Objective {
           q.normal(columns[i], columns[j]) += weight[k] * column.dot(block.col(columns[j]));
       }
     }
+    const Eigen::VectorXd value = values(point.estimate);
     q.normal.diagonal() += precision_;
-    q.gradient += precision_.cwiseProduct(expected_ - values(point.estimate));
+    q.gradient += precision_.cwiseProduct(expected_ - value);
+    for (const Group& g : groups_) {
+      const Eigen::Index size = g.precision.rows();
+      q.normal.block(g.first, g.first, size, size) += g.precision;
+      q.gradient.segment(g.first, size) -= g.precision * g.of(value);
+    }
     return q;
+  }
+
+  /// Measured numbers that the fit takes up: the unknowns less tr(normal^-1 * prior precision), which priors decide.
+  double fitted_numbers(const Eigen::MatrixXd& normal) const {
+    double sum = static_cast<double>(unknowns_.count());
+    if (groups_.empty() && precision_.isZero(0)) return sum;
+    const Eigen::MatrixXd covariance = inverse_of_symmetric(normal);
+    sum -= covariance.diagonal().dot(precision_);
+    for (const Group& g : groups_) {
+      const Eigen::Index size = g.precision.rows();
+      sum -= covariance.block(g.first, g.first, size, size).cwiseProduct(g.precision).sum();
+    }
+    return sum;
   }
 
   Point moved(const Point& from, const Eigen::VectorXd& dx) const {
@@ -197,8 +238,8 @@ class Objective {
     return unknowns_.parameters[parameter].get(estimate.set) - least < 1e-9 * units_[i];
   }
 
-  RobustWeights weights(const Point& point) const {
-    return robust_weights(point.square, rows_, unknowns_.count());
+  RobustWeights weights(const Point& point, const Quadratic& quadratic) const {
+    return robust_weights(point.square, rows_, fitted_numbers(quadratic.normal));
   }
 
   std::size_t rows() const { return rows_.size(); }
@@ -220,6 +261,7 @@ class Objective {
   const std::vector<Observation>& rows_;
   const Robot& robot_;
   Eigen::VectorXd units_;
+  std::vector<Group> groups_;
   Eigen::VectorXd precision_;  // of the priors
   Eigen::VectorXd expected_;
   Eigen::VectorXd least_;
@@ -265,7 +307,7 @@ Minimum minimise(const Objective& objective, const Estimate& start, const Estima
   // Re-weights until the weights are stationary; a step between two sets of weights is no test of convergence.
   const auto weights_changed = [&]() {
     if (!options.robust) return false;
-    RobustWeights fresh = objective.weights(m.point);
+    RobustWeights fresh = objective.weights(m.point, m.quadratic);
     double change = 0;
     for (std::size_t k = 0; k < fresh.weight.size(); ++k)
       change = std::max(change, std::abs(fresh.weight[k] - m.robust.weight[k]));
@@ -311,13 +353,12 @@ void add_uncertainty(const Objective& objective, const Quadratic& quadratic, con
   const Eigen::Index columns = static_cast<Eigen::Index>(unknowns.count());
   const Eigen::Index frames = static_cast<Eigen::Index>(unknowns.frames.size());
   const Eigen::MatrixXd normal = quadratic.normal.selfadjointView<Eigen::Lower>();
-  const Ldlt factor(normal);
-  out.covariance = factor.inverse();
+  out.covariance = inverse_of_symmetric(normal);
   if (out.degrees_of_freedom >= 1 && out.chi2 > chi2_quantile(0.9995, out.degrees_of_freedom)) {
     // The declared noise does not explain the residuals: their own variance scales the covariance.
     out.covariance *= out.chi2 / out.degrees_of_freedom;
   }
-  const Eigen::VectorXd to_unbounded = factor.solve(quadratic.gradient);
+  const Eigen::VectorXd to_unbounded = Ldlt(normal).solve(quadratic.gradient);
   for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
     const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
     const double value = unknowns.parameters[p].get(out.estimate.set);
@@ -349,7 +390,7 @@ Fit fit(const Estimate& start, const Unknowns& unknowns, const std::vector<Obser
     out.chi2 += m.point.square[static_cast<Eigen::Index>(k)];
     measured += measured_numbers(rows[k]);
   }
-  out.degrees_of_freedom = measured - static_cast<double>(unknowns.count());
+  out.degrees_of_freedom = measured - objective.fitted_numbers(m.quadratic.normal);
   // Re-weighting leaves a gradient of the size of rounding, in units of the bulk's chi-square.
   out.converged = std::isfinite(out.newton_decrement) &&
                   std::abs(out.newton_decrement) < 1e-8 * std::max(1.0, out.scale * out.scale);

@@ -3,6 +3,8 @@
 /// Priors of parameters: physical bounds and tolerances.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -16,6 +18,12 @@ struct PriorKnowledge {
   double least = -std::numeric_limits<double>::infinity();  ///< physical lower bound: 0 for a compliance
   double expected = 0;
   double tolerance = std::numeric_limits<double>::infinity();  ///< standard deviation around `expected`
+};
+
+/// Common prior of consecutive parameters: normal around 0.
+struct GroupPrior {
+  std::size_t first = 0;      ///< parameter
+  Eigen::MatrixXd precision;  ///< inverse of their covariance, SI
 };
 
 /// Priors of the parameters, one each. \param physical a joint deflects in the direction of the torque:

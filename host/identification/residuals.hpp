@@ -29,6 +29,7 @@ struct Unknowns {
   std::vector<std::size_t> frames = {};
   std::vector<Parameter> parameters = {};
   std::vector<PriorKnowledge> prior = {};  ///< one per parameter; may be shorter: the others have none
+  std::vector<GroupPrior> groups = {};     ///< of parameters that have no tolerance in `prior`
 
   std::size_t count() const { return frames.size() + parameters.size(); }
   PriorKnowledge prior_of(std::size_t parameter) const {

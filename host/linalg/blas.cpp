@@ -4,6 +4,7 @@
 #include <cblas.h>
 
 extern "C" void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+extern "C" void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 
 namespace flexcomp::host {
 
@@ -55,6 +56,17 @@ bool factor_in_place(Eigen::MatrixXd& symmetric) {
   const char lower = 'L';
   dpotrf_(&lower, &n, symmetric.data(), &n, &info);
   return info == 0;
+}
+
+Eigen::MatrixXd inverse_of_factored(const Eigen::MatrixXd& factor) {
+  Eigen::MatrixXd out = factor;
+  const int n = whole(factor.rows());
+  if (n == 0) return out;
+  int info = 0;
+  const char lower = 'L';
+  dpotri_(&lower, &n, out.data(), &n, &info);
+  out.triangularView<Eigen::StrictlyUpper>() = out.transpose();
+  return out;
 }
 
 void solve_lower(const Eigen::MatrixXd& factor, Eigen::MatrixXd& b) {

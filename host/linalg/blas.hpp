@@ -18,6 +18,8 @@ Eigen::MatrixXd gram(const Eigen::MatrixXd& a);
 
 /// Lower Cholesky factor in place (the upper triangle is left as it was). False where the matrix is not positive definite.
 bool factor_in_place(Eigen::MatrixXd& symmetric);
+/// (L L^T)^-1, both triangles
+Eigen::MatrixXd inverse_of_factored(const Eigen::MatrixXd& factor);
 /// b <- L^-1 b
 void solve_lower(const Eigen::MatrixXd& factor, Eigen::MatrixXd& b);
 /// b <- L^-T b
