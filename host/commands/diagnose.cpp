@@ -101,6 +101,7 @@ void Diagnose::run() const {
   save_calibration(out, d.after, robot_file);
   const bool planned = !plan.empty() && write_plan(d, robot_file);
 
+  common.say(error_sentence(d, others));
   common.say(verdict_sentence(d));
   for (const std::string& line : effect_lines(d, robot_file)) common.say(line);
   for (const std::string& line : gap_lines(d, others)) common.say(line);

@@ -31,6 +31,10 @@ std::vector<std::string> effect_lines(const Diagnosis& d, const Robot& robot) {
       lines.push_back("      these data cannot tell it from: " + rivals_text(e));
   }
   for (const EffectId& id : unnamed_effects(d, robot)) lines.push_back("  " + name(id) + ": " + in_words(id));
+  if (d.remainder) {
+    if (const std::string text = remainder_sentence(*d.remainder); !text.empty())
+      lines.push_back("  " + text);
+  }
   if (d.where) {
     lines.push_back(fmt::format("  where {}: {}", d.verdict == Verdict::unnamed ? "the gap is" : "it was",
                                 where_sentence(*d.where)));
@@ -77,7 +81,7 @@ std::vector<std::string> next_steps(const Diagnosis& d, const std::string& calib
         fmt::format("into the controller: flexcomp push --to BUS {} --allow-unnamed (an effect that nobody "
                     "understands is pushed only if you say so)",
                     calibration));
-  } else if (d.verdict == Verdict::unnamed && d.effects.empty()) {
+  } else if (d.verdict == Verdict::unnamed && d.effects.empty() && !d.remainder) {
     steps.push_back(
         "before anything is pushed: look for a wrong convention, unit or joint in the data, or noise that "
         "was declared too small; nothing was added to the model");

@@ -69,6 +69,31 @@ std::vector<PlaceShare> place_shares_at(const Refit& refit, const Robot& robot,
   return place_shares(system, residual_after(system));
 }
 
+/// Shares of the places in what a refit leaves, curves and all, by the declared noise.
+std::vector<PlaceShare> place_shares_beside_curves(const Diagnosis& d, const FittedModel& start,
+                                                   const Refit& refit, const Robot& robot,
+                                                   const std::vector<Observation>& rows) {
+  const GapSystem system =
+      gap_system(robot, rows, refit.fit.has_full_weight(rows.size()), refit.fit.estimate, start.fitted);
+  Eigen::VectorXd left = whitened(d.residuals_after, rows);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (!system.counts[k]) left.segment<6>(first_number(k)).setZero();
+  }
+  return place_shares(system, {left, system.nuisance, system.numbers - refit.fit.degrees_of_freedom, 1});
+}
+
+/// The measured part of every carried curve; those without a name are marked in the calibration.
+void describe_remainder(Diagnosis& out, const Refit& refit, const Robot& robot,
+                        const std::vector<Observation>& rows) {
+  for (CarriedCurve& curve : out.remainder->curves) {
+    if (!curve.named) out.after.regularised.push_back(curve.joint);
+    for (const EffectGroup& group : effects_of(refit.fit.estimate.set, robot.nominal)) {
+      if (group.id.joint != curve.joint) continue;
+      if (const auto span = curve_span(refit, group, rows)) curve.span = *span;
+    }
+  }
+}
+
 /// Local faults that few rows show, notes of the search, outliers.
 std::vector<std::string> notes_of(const SearchResult& found, const std::vector<std::size_t>& outliers,
                                   const std::vector<Observation>& rows) {
@@ -132,8 +157,8 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   out.places = place_shares(first.system(), residual_after(first, first.score({})));
   progress("what no name explains", 0.55);
   const LeftOutPoses left_out(rows);
-  const std::optional<CurveMaximum> curves = carry_remainder(selection, robot, rows, left_out);
-  const bool scatters = !curves && selection.found.unnamed &&
+  out.remainder = carry_remainder(selection, robot, rows, left_out);
+  const bool scatters = !out.remainder && selection.found.unnamed &&
                         prefer_scatter(selection, robot, rows, start, options.columns, out.places, progress);
 
   progress("how sure it is", 0.7);
@@ -141,9 +166,16 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   const Refit& refit = selection.refit;
   compare(out, robot, rows, source, start, refit);
   const ResidualAnalysis left = residual_after(*found.search, found.solution);
-  out.places_left = scatters ? place_shares_at(refit, robot, rows) : place_shares(*found.system, left);
+  out.places_left = scatters        ? place_shares_at(refit, robot, rows)
+                    : out.remainder ? place_shares_beside_curves(out, start, refit, robot, rows)
+                                    : place_shares(*found.system, left);
   out.effects = found_effects(robot, selection, left, left_out, options.seed);
   out.steps = steps_of(selection, out.effects, left_out);
+  if (out.remainder) {
+    describe_remainder(out, refit, robot, rows);
+    out.steps.push_back({"curves that carry the rest", out.error_after.rms_m, out.chi2_per_dof_after,
+                         out.remainder->cross_validated});
+  }
   out.not_testable = selection.search->not_testable();
   out.dropped = found.system->dropped;
 
@@ -151,12 +183,15 @@ Diagnosis diagnose(const Robot& robot, const std::vector<Observation>& rows, con
   out.where = found.misfit;
   if (!out.where && !out.effects.empty()) out.where = misfit_of(out.effects.front(), out.places);
   out.notes = notes_of(found, out.outliers, rows);
+  if (options.start && has_fitted_curves(*options.start))
+    out.notes.emplace_back(
+        "the joints' curves of the calibration at the start were searched anew: before is without them");
 
   progress("poses that tell rivals apart", 0.9);
   out.discriminating_poses =
       discriminating_poses(robot, *selection.rows, selection.start, selection.search->candidate_set(),
                            found.hypotheses, out.effects, options.seed);
-  add_doubts(out, refit.fit, !found.hypotheses.empty());
+  add_doubts(out, refit.fit, !found.hypotheses.empty() || out.remainder);
   progress("done", 1);
   return out;
 }

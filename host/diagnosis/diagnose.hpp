@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Diagnosis of the misfit between a calibrated model and measured rows: which effects are missing, with a calibration that
-/// has them. docs/diagnosis.md has the equations (D1) to (D18).
+/// has them. docs/diagnosis.md has the equations (D1) to (D20).
 ///
 /// Stages, bottom up; each header includes only headers that stand before it in this table:
 ///
@@ -16,9 +16,11 @@
 /// | smooth_functions, bump_functions | unnamed functions of one or two covariates, their relevant members | D9, D10, D11 (Tipping 2001) |
 /// | cross_validation | leave-one-pose-out prediction, pruning | D12 (Allen 1974) |
 /// | hypothesis, scanned_blocks | what a search selects; blocks that scans add | |
+/// | joint_curves | curves of all joints, their sizes and spectrum | D19, D20 (MacKay 1992; Rasmussen and Williams 2006) |
 /// | smooth_table, refit | nonlinear fit with the selected hypotheses | D16; docs/model.md, M34 to M40 |
 /// | outlier_hypotheses | outliers or structure | D13 |
 /// | effect_search | the search: selection, pruning, outliers, lack of fit; search and refit in turns | D14 |
+/// | remainder | what no name explains, carried; names beside it | D19, D20 |
 /// | scatter | places that scatter from pose to pose, as the alternative | D15 |
 /// | found_effects | p-values, confounded effects, sizes | D17 |
 /// | discriminating_poses | poses that separate confounded effects | D18 (Atkinson and Fedorov 1975) |

@@ -101,6 +101,26 @@ Json where_json(const std::optional<Misfit>& where) {
           {"explains", where->explains},       {"p_value", where->p_value}};
 }
 
+Json remainder_json(const std::optional<Remainder>& remainder) {
+  if (!remainder) return nullptr;
+  return {{"curves", json_list(remainder->curves,
+                               [](const CarriedCurve& c) -> Json {
+                                 return {{"joint", c.joint},
+                                         {"named", c.named},
+                                         {"sure", c.sure},
+                                         {"size_rad", c.size_rad},
+                                         {"low_rad", c.span.low_rad},
+                                         {"high_rad", c.span.high_rad},
+                                         {"sigma_rad", c.span.sigma_rad}};
+                               })},
+          {"corner_per_turn", remainder->corner},
+          {"gain", remainder->gain},
+          {"cross_validation", remainder->cross_validation},
+          {"position_noise", remainder->position_noise},
+          {"orientation_noise", remainder->orientation_noise},
+          {"pushed", true}};
+}
+
 Json gap_json(const ErrorStatistics& train, const ErrorStatistics* holdout) {
   Json j{{"train_rms_mm", train.rms_m * 1e3}, {"holdout_rms_mm", nullptr}, {"holdout_rms_deg", nullptr}};
   if (holdout != nullptr) {
@@ -124,6 +144,7 @@ Json to_json(const Diagnosis& d, const std::vector<Observation>& rows, const std
   j["not_testable"] = json_list(d.not_testable, [](const NotTestable& n) -> Json {
     return {{"effect", effect_name(n.effect)}, {"needs", n.needs}};
   });
+  j["remainder"] = remainder_json(d.remainder);
   j["where"] = where_json(d.where);
   j["gap"] = {{"before", gap_json(d.error_before, holdout ? &holdout->before : nullptr)},
               {"after", gap_json(d.error_after, holdout ? &holdout->after : nullptr)},

@@ -7,12 +7,50 @@
 #include <cmath>
 #include <random>
 
+#include "flexcomp/forward.hpp"
 #include "linalg/blas.hpp"
 #include "model/covariate.hpp"
 #include "model/effects/descriptor.hpp"
 #include "model/place.hpp"
 
 namespace flexcomp::host {
+
+std::optional<CurveSpan> curve_span(const Refit& refit, const EffectGroup& group,
+                                    const std::vector<Observation>& rows) {
+  if (group.id.effect != Effect::joint_curve || group.id.factor != Factor::one || rows.empty()) return {};
+  const std::size_t size = group.parameters.size();
+  Eigen::MatrixXd weight =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(size));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto w = detail::curve_weights(rows[k].q_rad[group.id.joint - 1], static_cast<std::uint16_t>(size));
+    for (std::size_t i = 0; i < 4; ++i)
+      weight(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(w.index[i])) += w.w[i];
+  }
+  // A turn that is the same everywhere is geometry.
+  weight.rowwise() -= Eigen::RowVectorXd(weight.colwise().mean());
+  Eigen::VectorXd value(weight.cols());
+  std::vector<Eigen::Index> own, of_fit;
+  for (std::size_t c = 0; c < size; ++c) {
+    value[static_cast<Eigen::Index>(c)] = group.parameters[c].get(refit.fit.estimate.set);
+    for (std::size_t p = 0; p < refit.fitted.parameters.size(); ++p) {
+      if (refit.fitted.parameters[p].value != group.parameters[c].value || !group.parameters[c].value)
+        continue;
+      own.push_back(static_cast<Eigen::Index>(c));
+      of_fit.push_back(static_cast<Eigen::Index>(refit.fitted.frames.size() + p));
+    }
+  }
+  const Eigen::VectorXd turn = weight * value;
+  CurveSpan out{turn.minCoeff(), turn.maxCoeff(), 0};
+  if (own.empty()) return out;
+  const double unit = unit_of(group.parameters.front(), refit.fit.estimate.set);
+  const Eigen::MatrixXd covariance = refit.fit.covariance(of_fit, of_fit) * (unit * unit);
+  const Eigen::MatrixXd of_rows = weight(Eigen::all, own);
+  std::vector<double> sigma;
+  for (Eigen::Index k = 0; k < of_rows.rows(); ++k)
+    sigma.push_back(std::sqrt(std::max(0.0, of_rows.row(k).dot(of_rows.row(k) * covariance))));
+  out.sigma_rad = median(sigma);
+  return out;
+}
 
 namespace {
 
@@ -113,6 +151,7 @@ void describe(FoundEffect& effect, const Refit& refit, const Robot& robot,
       effect.coefficients.push_back(c);
       p.set(without.set, 0);
     }
+    effect.curve = curve_span(refit, group, rows);
     const std::vector<RowResidual> a = residuals(refit.fit.estimate, robot, rows, "diagnosis");
     std::vector<RowResidual> shift = residuals(without, robot, rows, "diagnosis");
     for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -16,6 +16,10 @@ namespace flexcomp::host {
 std::vector<FoundEffect> found_effects(const Robot& robot, const Selection& selection,
                                        const ResidualAnalysis& left, const LeftOutPoses& left_out,
                                        std::uint64_t seed);
+/// The curve of a group of a refit at the measured readings; nothing of other effects.
+std::optional<CurveSpan> curve_span(const Refit& refit, const EffectGroup& group,
+                                    const std::vector<Observation>& rows);
+
 /// Errors of the start, and after each effect and unnamed function that is added in turn.
 std::vector<DiagnosisStep> steps_of(const Selection& selection, const std::vector<FoundEffect>& effects,
                                     const LeftOutPoses& left_out);

@@ -53,7 +53,8 @@ Eigen::MatrixXd coefficient_covariance(double size_rad, double corner, std::size
     const double variance =
         size_rad * size_rad * spectrum(n, corner) / sum / std::pow(spline_gain(n, coefficients), 2);
     for (Eigen::Index k = 0; k < count; ++k)
-      along[k] += variance * std::cos(2 * pi * n * static_cast<double>(k) / static_cast<double>(coefficients));
+      along[k] +=
+          variance * std::cos(2 * pi * n * static_cast<double>(k) / static_cast<double>(coefficients));
   }
   Eigen::MatrixXd out(count, count);
   for (Eigen::Index r = 0; r < count; ++r) {
@@ -115,8 +116,7 @@ CurveEvidence::CurveEvidence(const SubsetSearch& search, const std::vector<Obser
     Eigen::MatrixXd columns = system.columns(Eigen::all, block.columns);
     if (search.precision_of(block, block.columns.front()) > 0) {
       for (Eigen::Index c = 0; c < columns.cols(); ++c)
-        columns.col(c) /=
-            std::sqrt(search.precision_of(block, block.columns[static_cast<std::size_t>(c)]));
+        columns.col(c) /= std::sqrt(search.precision_of(block, block.columns[static_cast<std::size_t>(c)]));
     } else {
       Eigen::MatrixXd factor = gram(columns);
       factor.diagonal() *= 1 + 1e-9;
@@ -175,8 +175,9 @@ CurveEvidence::Features CurveEvidence::features(const Subset& blocks,
 /// Logarithms: noise of positions, of orientations, corner, sizes of the joints that have a curve.
 struct CurveEvidence::Point {
   Eigen::VectorXd log;
-  double value = -std::numeric_limits<double>::infinity();  // 2 ln of the marginal likelihood and the weak priors
-  Eigen::VectorXd slope;                                    // derivative of it
+  double value =
+      -std::numeric_limits<double>::infinity();  // 2 ln of the marginal likelihood and the weak priors
+  Eigen::VectorXd slope;                         // derivative of it
 };
 
 namespace {
@@ -189,7 +190,7 @@ bool CurveEvidence::evaluate(const Features& f, const Eigen::VectorXd& log, bool
   const auto count = static_cast<Eigen::Index>(f.index.size());
   const double corner = std::exp(log[at_corner]);
   double sum = 0;
-  double sum_slope = 0;  // d sum / d ln corner
+  double sum_slope = 0;                   // d sum / d ln corner
   const auto slope_of = [&](int order) {  // d ln spectrum / d ln corner
     return fall * (1 - spectrum(order, corner));
   };
@@ -358,10 +359,8 @@ CurveMaximum CurveEvidence::maximum(const Subset& blocks, const std::array<bool,
     const Eigen::VectorXd change = now.slope - next.slope;
     const double along = moved.dot(change);
     if (along > 1e-10) {
-      const Eigen::MatrixXd left =
-          Eigen::MatrixXd::Identity(n, n) - moved * change.transpose() / along;
-      inverse_hessian =
-          left * inverse_hessian * left.transpose() + moved * moved.transpose() / along;
+      const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n, n) - moved * change.transpose() / along;
+      inverse_hessian = left * inverse_hessian * left.transpose() + moved * moved.transpose() / along;
     }
     const double gain = next.value - now.value;
     log = next.log;

@@ -45,18 +45,10 @@ std::string amplitude(const FoundEffect& effect) {
                      effect.id.order > 1 ? fmt::format(" and every {:.4g} deg", 360 / effect.id.order) : "");
 }
 
-std::string curve_size(const KeyedCoefficients& c) {
-  double low = HUGE_VAL, high = -HUGE_VAL;
-  std::vector<double> sigmas;
-  for (const EffectCoefficient& v : c.values) {
-    low = std::min(low, v.value);
-    high = std::max(high, v.value);
-    if (std::isfinite(v.sigma)) sigmas.push_back(v.sigma);  // of a local fault only those near it are fitted
-  }
-  const double sigma = sigmas.empty() ? std::nan("") : median(sigmas);
-  return fmt::format(
-      "{}: {} of them between {:.3g} and {:.3g}, +- {:.2g}  ({:.3g} … {:.3g}, +- {:.2g} arcsec)", c.key,
-      c.values.size(), low, high, sigma, low * arcsec_per_rad, high * arcsec_per_rad, sigma * arcsec_per_rad);
+std::string curve_size(const CurveSpan& span) {
+  return fmt::format("{:.0f} … {:+.0f} arcsec at the measured readings, +- {:.0f}",
+                     span.low_rad * arcsec_per_rad, span.high_rad * arcsec_per_rad,
+                     span.sigma_rad * arcsec_per_rad);
 }
 
 }  // namespace
@@ -117,6 +109,28 @@ std::string verdict_sentence(const Diagnosis& d) {
   return text;
 }
 
+std::string error_sentence(const Diagnosis& d, const std::optional<HeldOut>& others) {
+  const ErrorStatistics& before = others ? others->before : d.error_before;
+  const ErrorStatistics& after = others ? others->after : d.error_after;
+  return fmt::format("Position error {:.3f} -> {:.3f} mm (mean of {}).", before.mean_m * 1e3,
+                     after.mean_m * 1e3,
+                     others ? fmt::format("{} rows that were not fitted", others->rows)
+                            : "the fitted rows; --holdout tells it of others");
+}
+
+std::string remainder_sentence(const Remainder& remainder) {
+  std::vector<std::string> joints;
+  for (const CarriedCurve& c : remainder.curves) {
+    if (!c.named)
+      joints.push_back(fmt::format("{} ({:.0f} arcsec rms)", c.joint, c.size_rad * arcsec_per_rad));
+  }
+  if (joints.empty()) return "";
+  return fmt::format(
+      "carried without a name: smooth curves of {} {}; poses that are left out are predicted {:.0f} % better",
+      joints.size() == 1 ? "joint" : "joints", list_of(joints),
+      100 * (1 - std::sqrt(std::max(0.0, 1 - remainder.cross_validation))));
+}
+
 std::vector<KeyedCoefficients> by_key(const FoundEffect& effect) {
   std::vector<KeyedCoefficients> list;
   for (const EffectCoefficient& c : effect.coefficients) {
@@ -130,13 +144,14 @@ std::vector<KeyedCoefficients> by_key(const FoundEffect& effect) {
 
 std::vector<std::string> sizes(const FoundEffect& effect) {
   std::vector<std::string> lines;
+  if (effect.curve) return {curve_size(*effect.curve)};
   if (effect.id.order != 0 && effect.coefficients.size() == 2) {
     const std::string text = amplitude(effect);
     if (!text.empty()) lines.push_back(text);
   }
   for (const KeyedCoefficients& c : by_key(effect)) {
     if (c.list) {
-      lines.push_back(curve_size(c));
+      lines.push_back(fmt::format("{}: {} numbers", c.key, c.values.size()));
       continue;
     }
     const EffectCoefficient& v = c.values.front();

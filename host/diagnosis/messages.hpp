@@ -3,9 +3,11 @@
 /// What a diagnosis says, in sentences and in the units of those who maintain the arm: for the terminal and for the page.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/held_out.hpp"
 #include "diagnosis/result.hpp"
 
 namespace flexcomp::host {
@@ -15,6 +17,10 @@ std::string in_words(const EffectId& id);
 
 /// The verdict in one plain sentence.
 std::string verdict_sentence(const Diagnosis& d);
+/// The mean position error before and after, on held-out rows where there are any.
+std::string error_sentence(const Diagnosis& d, const std::optional<HeldOut>& others);
+/// What is carried without a name; empty where nothing is.
+std::string remainder_sentence(const Remainder& remainder);
 
 /// "a, b and c".
 std::string list_of(const std::vector<std::string>& items);

@@ -214,8 +214,47 @@ Refit refit_model(const Robot& robot, const std::vector<Observation>& declared, 
   return out;
 }
 
-FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
+namespace {
+
+/// Whether a term reads a curve that was fitted, named or carried: its cause is searched anew.
+bool is_fitted_curve(const Term<double>& term, const Calibration& calibration) {
+  if (term.effect != Effect::joint_curve || term.factor != Factor::one) return false;
+  if (std::ranges::find(calibration.regularised, term.joint + 1U) != calibration.regularised.end())
+    return true;
+  const Table& table = calibration.terms.tables[term.table];
+  for (std::size_t k = table.offset; k < table.offset + std::size_t{table.size}; ++k) {
+    if (k < calibration.value_sigma.size() && std::isfinite(calibration.value_sigma[k])) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool has_fitted_curves(const Calibration& calibration) {
+  return std::ranges::any_of(calibration.terms.terms,
+                             [&](const Term<double>& t) { return is_fitted_curve(t, calibration); });
+}
+
+namespace {
+
+Calibration without_curves(Calibration calibration) {
+  const Calibration all = calibration;
+  calibration.terms.terms.clear();
+  calibration.sigma.clear();
+  for (std::size_t t = 0; t < all.terms.terms.size(); ++t) {
+    if (is_fitted_curve(all.terms.terms[t], all)) continue;
+    calibration.terms.terms.push_back(all.terms.terms[t]);
+    if (t < all.sigma.size()) calibration.sigma.push_back(all.sigma[t]);
+  }
+  calibration.regularised.clear();
+  return calibration;
+}
+
+}  // namespace
+
+FittedModel fit_calibration(const Calibration& given, const Robot& robot,
                             const std::vector<Observation>& rows, std::uint64_t seed) {
+  const Calibration calibration = without_curves(given);
   const Estimate estimate = estimate_of(calibration);
   Unknowns all;
   if (calibration.frames) all.frames = free_frames(rows);

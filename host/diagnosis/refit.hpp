@@ -19,9 +19,12 @@ struct FittedModel {
 };
 
 /// Fits a calibration's own parameters again. What it was given and did not fit stays fixed; an effect `unnamed` too, so
-/// that its cause is searched anew.
+/// that its cause is searched anew. Curves that were fitted are left out for the same reason.
 FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
                             const std::vector<Observation>& rows, std::uint64_t seed);
+
+/// Whether a calibration has curves that were fitted.
+bool has_fitted_curves(const Calibration& calibration);
 
 /// The start's parameters and the effects'.
 struct Refit : FittedModel {

@@ -13,9 +13,8 @@ namespace flexcomp::host {
 
 /// Curves that carry what the selection leaves over, at the maximum of their marginal likelihood; nothing where they gain no
 /// more than a name must, or predict left-out poses no better (D12). Removes from the selection what is not sure beside
-/// them, and refits it with them.
-std::optional<CurveMaximum> carry_remainder(Selection& selection, const Robot& robot,
-                                            const std::vector<Observation>& rows,
-                                            const LeftOutPoses& left_out);
+/// them, and refits it with them. A joint's curve keeps its name where the search named one and it is sure.
+std::optional<Remainder> carry_remainder(Selection& selection, const Robot& robot,
+                                         const std::vector<Observation>& rows, const LeftOutPoses& left_out);
 
 }  // namespace flexcomp::host

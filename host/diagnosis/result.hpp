@@ -3,6 +3,7 @@
 /// Answer of a diagnosis: verdict, effects with their uncertainty, places of the misfit, calibration before and after.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <string>
@@ -35,16 +36,23 @@ struct Rival {
   double delta_bic = 0;  ///< BIC with this name less BIC with the chosen one; below decisive_bic
 };
 
+/// A curve where it was measured, beyond its mean there.
+struct CurveSpan {
+  double low_rad = 0, high_rad = 0;  ///< least and greatest turn at the measured readings
+  double sigma_rad = 0;              ///< median standard deviation there
+};
+
 /// An effect of the catalogue that was identified.
 struct FoundEffect {
   EffectId id;
   std::vector<EffectCoefficient> coefficients;
-  double p_value = 1;           ///< of the whole catalogue under permuted poses (D17)
-  double delta_bic = 0;         ///< BIC of the final model without this effect less BIC with it
-  double cross_validation = 0;  ///< share of the chi-square on left-out poses that the effect takes away
-  double largest_m = 0;         ///< largest shift of the measured point that it causes at the measured poses
-  double rms_m = 0;             ///< its root mean square
-  bool pushed = true;           ///< false: belongs to the measurement
+  std::optional<CurveSpan> curve;  ///< of a joint curve
+  double p_value = 1;              ///< of the whole catalogue under permuted poses (D17)
+  double delta_bic = 0;            ///< BIC of the final model without this effect less BIC with it
+  double cross_validation = 0;     ///< share of the chi-square on left-out poses that the effect takes away
+  double largest_m = 0;  ///< largest shift of the measured point that it causes at the measured poses
+  double rms_m = 0;      ///< its root mean square
+  bool pushed = true;    ///< false: belongs to the measurement
   std::vector<Rival> confounded_with;
 };
 
@@ -80,12 +88,37 @@ struct DiagnosisStep {
   double cross_validated = 0;  ///< chi-square per measured number on left-out poses
 };
 
+/// A joint whose curve is carried, named or not.
+struct CarriedCurve {
+  unsigned joint = 0;   ///< from 1
+  double size_rad = 0;  ///< standard deviation of the curve, by its marginal likelihood
+  bool sure = false;    ///< it gains as much as a name must
+  bool named = false;   ///< it is among the effects
+  CurveSpan span = {};
+};
+
+/// What no name explains, carried by curves of joints (D19, D20).
+struct Remainder {
+  std::vector<CarriedCurve> curves;
+  double corner = 0;             ///< periods per turn up to which their common spectrum is flat
+  double gain = 0;               ///< 2 ln of the Bayes factor against no curves
+  double cross_validated = 0;    ///< chi-square per measured number on left-out poses
+  double cross_validation = 0;   ///< share of it that they take away
+  double position_noise = 1;     ///< noise that is left over the declared one, standard deviations
+  double orientation_noise = 1;  ///< the same of orientations
+
+  bool is_unnamed() const {
+    return std::ranges::any_of(curves, [](const CarriedCurve& c) { return c.sure && !c.named; });
+  }
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::none;
   std::vector<FoundEffect> effects;  ///< what was named, measurement effects too; never an unnamed one
   std::vector<NotTestable> not_testable;
   std::vector<EffectId> dropped;  ///< less than 1e-3 of their columns is left after the projection (D1)
-  std::optional<Misfit> where;    ///< of the gap: the remaining one if unnamed, else that of the first effect
+  std::optional<Remainder> remainder;
+  std::optional<Misfit> where;  ///< of the gap: the remaining one if unnamed, else that of the first effect
   std::vector<PlaceShare> places;       ///< of the model at the start, largest first
   std::vector<PlaceShare> places_left;  ///< of the final model
   std::vector<DiagnosisStep> steps;     ///< first the model at the start

@@ -164,6 +164,11 @@ class SetReader {
           expected_name(effect_text, effect_names(), "one of", "an effect of the catalogue"));
     std::vector<std::string> selectors{"effect"};
     const EffectId id = identity(entry, *effect, selectors);
+    if (*effect == Effect::joint_curve && id.factor == Factor::one) {
+      selectors.emplace_back("regularised");
+      const auto field = entry.find("regularised");
+      if (field && field->boolean()) out_.regularised.push_back(id.joint);
+    }
     if (const auto wrong = validation_error(id, robot_.nominal)) throw entry.error(*wrong, name(id));
     const auto [at, is_new] = seen_.emplace(name(id), entry.line());
     if (!is_new)
@@ -441,6 +446,9 @@ std::vector<std::string> selectors_text(const EffectId& id) {
 
 std::string effect_text(const Calibration& c, const EffectGroup& group) {
   std::vector<std::string> parts = selectors_text(group.id);
+  if (group.id.effect == Effect::joint_curve && group.id.factor == Factor::one &&
+      std::ranges::find(c.regularised, group.id.joint) != c.regularised.end())
+    parts.emplace_back("regularised: true");
   if (descriptor(group.id.effect).table != TableKind::none) {
     std::vector<std::string> values;
     std::vector<std::string> sigmas;

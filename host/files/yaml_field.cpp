@@ -175,6 +175,12 @@ double YamlField::number(const Unit& unit, double above, const std::string& expe
   return value;
 }
 
+bool YamlField::boolean() const {
+  const std::string value = text();
+  if (value != "true" && value != "false") throw error("true or false");
+  return value == "true";
+}
+
 unsigned YamlField::integer(unsigned least, unsigned most) const {
   unsigned value = 0;
   const std::string& text = node_.IsScalar() ? node_.Scalar() : std::string();

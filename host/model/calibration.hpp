@@ -46,6 +46,7 @@ struct Calibration {
   std::vector<double> value_sigma;          ///< the same per value of the tables
   std::optional<MeasurementFrames> frames;  ///< where fitted; the base is then not pushed
   std::optional<CovarianceFactor> covariance;
+  std::vector<unsigned> regularised;  ///< joints (from 1) whose curve carries what no name explains
   std::vector<Confounded> confounded;
   std::vector<AtBound> at_bound;
   std::vector<std::pair<std::string, double>> residuals;  ///< by name with unit, e.g. after_mean_mm

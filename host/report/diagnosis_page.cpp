@@ -188,6 +188,17 @@ PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::v
         ". It is described so that the error still shrinks; nobody has understood it.");
     section.figures.push_back(unnamed_figure(d.after, group));
   }
+  for (const EffectGroup& group : effects_of(d.after.terms, robot.nominal)) {
+    if (group.id.effect != Effect::joint_curve ||
+        std::ranges::find(d.after.regularised, group.id.joint) == d.after.regularised.end())
+      continue;
+    if (const auto profile = profile_of(robot, d.after, group.id, rows)) {
+      for (auto& figure : figures_of(*profile, name(group.id) + ", without a name"))
+        section.figures.push_back(std::move(figure));
+    }
+  }
+  if (d.remainder && !remainder_sentence(*d.remainder).empty())
+    section.paragraphs.push_back("What no name explains is " + remainder_sentence(*d.remainder) + ".");
   if (d.effects.empty()) {
     section.columns.clear();
     if (section.paragraphs.empty()) section.paragraphs.emplace_back("No effect of the catalogue.");
@@ -228,7 +239,7 @@ PageSection telling_section(const Diagnosis& d) {
 Page page_of(const Diagnosis& d, const std::vector<Observation>& rows, const Robot& robot,
              const std::string& data, const std::optional<HeldOut>& others) {
   Page p = titled_page("Diagnosis of " + robot.name, robot);
-  p.summary = verdict_sentence(d);
+  p.summary = error_sentence(d, others) + " " + verdict_sentence(d);
   p.doubts = d.doubts;
   p.facts = {{"data", data},
              {"poses", fmt::format("{}", rows.size())},
