@@ -107,6 +107,7 @@ std::vector<Observation> measured(const Robot& robot, const std::vector<arms::Jo
   const auto model = prepare(truth(), robot, "truth");
   std::mt19937_64 random(seed);
   std::vector<Observation> rows;
+  rows.reserve(poses.size());
   for (const arms::Joints& q : poses) rows.push_back(measure(*model, q, rows.size(), how, random));
   return rows;
 }
