@@ -75,7 +75,8 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
 Before errors_before(const Robot& robot, const std::vector<Observation>& rows, Estimate* fitted = nullptr);
 
 /// Estimates the measurement frames F (robot base in the instrument's frame) and E (measured point in Ftool), Eq. (M2), for
-/// given terms (none: the nominal arm): closed-form start, then robust refinement.
+/// given terms (none: the nominal arm): start by least squares from 24 rotations, then robust refinement. Parameters that the
+/// rows leave open keep their start.
 Estimate fit_frames(const TermSet& set, const std::vector<Observation>& rows, const Robot& robot);
 
 /// True where the nominal frames (F = E = 1) miss the median row by more than 20 mm or 2 degrees.

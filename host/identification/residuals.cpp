@@ -20,12 +20,6 @@ namespace {
 constexpr double frame_length_m = 1e-4;
 const double frame_angle_rad = radians(0.05);
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 /// d log(A exp(-w)) = -J w at w = 0 with e = log A: the inverse right Jacobian of SO(3) (Sola et al. 2018, Eq. 144).
 Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& e) {
   const double angle = e.norm();
@@ -117,6 +111,12 @@ Eigen::Matrix<double, 6, 12> frame_columns_of(const Estimate& estimate, const Po
 }
 
 }  // namespace
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
 
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
   const Eigen::AngleAxisd turn{Eigen::Quaterniond(rotation).normalized()};

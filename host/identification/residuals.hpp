@@ -85,6 +85,8 @@ void move(Estimate& estimate, const Unknowns& unknowns, const Eigen::VectorXd& d
 /// Names of all unknowns, frames first: frame_f.x_mm … frame_e.rz_deg, then the parameters.
 std::vector<std::string> names_of(const Unknowns& unknowns);
 
+/// [v]x: skew(v) * w is the cross product v x w.
+Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 /// Rotation vector log(R), rad; angle at most pi.
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation);
 /// Rotation matrix exp(w). \param rotation_vector_rad  w, of any length
