@@ -5,13 +5,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <ctime>
+#include <filesystem>
 #include <random>
 #include <utility>
 
 #include "flexcomp/image.hpp"
+#include "identification/fitted_calibration.hpp"
 #include "model/effects.hpp"
 #include "model/parameter_image.hpp"
+#include "support/curved_fit.hpp"
 #include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
@@ -163,6 +168,33 @@ TEST(CalibrationFile, RefusesAWrongLowRankFactor) {
   // Without the keys of a low-rank factor a lower triangle, as ever.
   refused("covariance_factor:\n  - {parameter: a, row: [1]}\n  - {parameter: b, row: [1]}\n", 3,
           "covariance_factor[2]", {"2 numbers: a lower triangle", "1"});
+}
+
+TEST(CalibrationFile, OfSixCurvesIsSmallAndQuicklyRead) {
+  const support::CurvedFit many(tx60l(), 100);
+  const Calibration c = fitted_calibration(many.fit, many.unknowns, many.robot, many.rows);
+  ASSERT_EQ(c.covariance->parameters.size(), 6 * curve_coefficients + 45);
+  const std::string path = support::path_of("six_curves.yaml");
+  save_calibration(path, c, tx60l());
+  const auto bytes = std::filesystem::file_size(path);
+  const std::clock_t begin = std::clock();
+  const Calibration again = load_calibration(path, tx60l());
+  const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  std::printf("  six curves: %zu bytes, read in %.2f s\n", static_cast<std::size_t>(bytes), seconds);
+  EXPECT_LE(bytes, 500'000U);
+#if !defined(__SANITIZE_ADDRESS__)
+  EXPECT_LT(seconds, 0.8);
+#endif
+  EXPECT_EQ(calibration_text(again, tx60l()), support::read(path));
+  // The curves' rows are read to the last bit; the others have nine digits, `own` six.
+  ASSERT_EQ(again.covariance->factor.cols(), c.covariance->factor.cols());
+  EXPECT_EQ(again.covariance->scale, c.covariance->scale);
+  EXPECT_EQ(again.covariance->factor.bottomRows(768), c.covariance->factor.bottomRows(768));
+  for (Eigen::Index i = 0; i < c.covariance->factor.rows(); ++i) {
+    EXPECT_NEAR(again.covariance->sigma(i) / c.covariance->sigma(i), 1, 1e-5);
+    EXPECT_NEAR((again.covariance->factor.row(i) - c.covariance->factor.row(i)).norm(), 0,
+                1e-8 * c.covariance->sigma(i));
+  }
 }
 
 TEST(CalibrationFile, ReadsEveryKeyOfTheCatalogue) {
