@@ -41,7 +41,7 @@ double noise_floor(const std::vector<Observation>& rows) {
 void compare(Diagnosis& out, const Robot& robot, const std::vector<Observation>& rows,
              const std::string& source, const FittedModel& start, const Refit& refit) {
   const std::vector<Confounded> confounded = out.before.confounded;
-  out.before = fitted_calibration(start.fit, start.fitted, robot);
+  out.before = fitted_calibration(start.fit, start.fitted, robot, rows);
   out.after = refit.calibration;
   out.before.confounded = out.after.confounded = confounded;
   out.noise_floor_m = noise_floor(rows);

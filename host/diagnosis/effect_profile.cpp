@@ -148,12 +148,12 @@ std::optional<EffectProfile> profile_of(const Robot& robot, const Calibration& c
   Eigen::MatrixXd covariance;
   if (calibration.covariance) {
     const auto& known = calibration.covariance->parameters;
-    Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(group->parameters.size()),
-                                                   calibration.covariance->factor.cols());
+    const Eigen::MatrixXd columns = calibration.covariance->columns();
+    Eigen::MatrixXd factor =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(group->parameters.size()), columns.cols());
     for (std::size_t p = 0; p < group->parameters.size(); ++p) {
       const auto at = std::ranges::find(known, group->parameters[p].name);
-      if (at != known.end())
-        factor.row(static_cast<Eigen::Index>(p)) = calibration.covariance->factor.row(at - known.begin());
+      if (at != known.end()) factor.row(static_cast<Eigen::Index>(p)) = columns.row(at - known.begin());
     }
     covariance = factor * factor.transpose();
   }

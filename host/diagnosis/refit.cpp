@@ -210,7 +210,7 @@ Refit refit_model(const Robot& robot, const std::vector<Observation>& declared, 
     centre_curve(out.fit.estimate.set, term, robot);
   }
   out.fitted = std::move(extended.fitted);
-  out.calibration = fitted_calibration(out.fit, out.fitted, robot);
+  out.calibration = fitted_calibration(out.fit, out.fitted, robot, rows);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "files/write_file.hpp"
@@ -24,6 +25,7 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t link_slot_count = 5;  // gamma has no constant part
+constexpr int largest_multiple = 999'999;   // of the scale of a row of the covariance factor
 
 // --- selectors of effects, both ways ------------------------------------------------------------------------------
 
@@ -318,6 +320,62 @@ Sha256Digest read_hash(const YamlField& field) {
   return digest;
 }
 
+/// Numbers of one row of the covariance factor; as many as its rows at most, the rest is zero.
+std::vector<double> read_covariance_row(const YamlField& row, std::size_t rows, double scale) {
+  const YamlField field = row.at("row");
+  const std::vector<YamlField> items = field.items();
+  if (items.size() > rows) {
+    throw field.error(fmt::format("at most {} numbers: no more columns than parameters", rows),
+                      fmt::format("{}", items.size()));
+  }
+  std::vector<double> numbers;
+  numbers.reserve(items.size());
+  for (const YamlField& item : items) {
+    const double number = scale > 0 ? item.whole_number(largest_multiple) * scale : item.number(unit::si);
+    if (!std::isfinite(number)) throw item.error("a finite number, times scale");
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+/// A lower triangle, or rows of a length of their own where any has a `scale` or `own`.
+CovarianceFactor read_covariance(const YamlField& list) {
+  const std::vector<YamlField> rows = list.items();
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  CovarianceFactor out;
+  std::set<std::string> seen;
+  std::vector<std::vector<double>> numbers;
+  const bool is_compact =
+      std::ranges::any_of(rows, [](const YamlField& row) { return row.has("scale") || row.has("own"); });
+  if (is_compact) out.own = out.scale = Eigen::VectorXd::Zero(count);
+  std::size_t columns = is_compact ? 0 : rows.size();
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const YamlField& row = rows[r];
+    const auto i = static_cast<Eigen::Index>(r);
+    row.require_keys({"parameter", "scale", "row", "own"});
+    out.parameters.push_back(row.at("parameter").text());
+    if (!seen.insert(out.parameters.back()).second)
+      throw row.at("parameter").error("each parameter once", out.parameters.back() + " twice");
+    if (const auto scale = row.find("scale")) out.scale[i] = scale->number(unit::si, 0, "a number above 0");
+    if (const auto own = row.find("own")) {
+      out.own[i] = own->number(unit::si);
+      if (!(out.own[i] >= 0)) throw own->error("a standard deviation of 0 or more");
+    }
+    numbers.push_back(read_covariance_row(row, rows.size(), is_compact ? out.scale[i] : 0));
+    if (!is_compact && numbers[r].size() != r + 1) {
+      throw row.error(fmt::format("{} numbers: a lower triangle", r + 1),
+                      fmt::format("{}", numbers[r].size()));
+    }
+    columns = std::max(columns, numbers[r].size());
+  }
+  out.factor = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(columns));
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t k = 0; k < numbers[r].size(); ++k)
+      out.factor(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)) = numbers[r][k];
+  }
+  return out;
+}
+
 void read_head(const YamlField& root, const Robot& robot, Calibration& c) {
   if (const auto field = root.find("robot")) {
     c.robot = field->text();
@@ -342,27 +400,7 @@ void read_head(const YamlField& root, const Robot& robot, Calibration& c) {
     if (const auto f = field->find("f")) c.frames->f = read_frame(*f);
     if (const auto e = field->find("e")) c.frames->e = read_frame(*e);
   }
-  if (const auto field = root.find("covariance_factor")) {
-    CovarianceFactor covariance;
-    const std::vector<YamlField> rows = field->items();
-    const Eigen::Index n = static_cast<Eigen::Index>(rows.size());
-    covariance.factor = Eigen::MatrixXd::Zero(n, n);
-    for (Eigen::Index r = 0; r < n; ++r) {
-      const YamlField& row = rows[static_cast<std::size_t>(r)];
-      row.require_keys({"parameter", "row"});
-      const std::string parameter = row.at("parameter").text();
-      if (std::find(covariance.parameters.begin(), covariance.parameters.end(), parameter) !=
-          covariance.parameters.end())
-        throw row.at("parameter").error("each parameter once", parameter + " twice");
-      covariance.parameters.push_back(parameter);
-      const std::vector<YamlField> values = row.at("row").items();
-      if (static_cast<Eigen::Index>(values.size()) != r + 1)
-        throw row.error(fmt::format("{} numbers: a lower triangle", r + 1), fmt::format("{}", values.size()));
-      for (Eigen::Index k = 0; k <= r; ++k)
-        covariance.factor(r, k) = values[static_cast<std::size_t>(k)].number(unit::si);
-    }
-    c.covariance = std::move(covariance);
-  }
+  if (const auto field = root.find("covariance_factor")) c.covariance = read_covariance(*field);
   if (const auto field = root.find("confounded")) {
     for (const YamlField& entry : field->items()) {
       entry.require_keys({"parameter", "with"});
@@ -470,6 +508,42 @@ std::string effect_text(const Calibration& c, const EffectGroup& group) {
   return fmt::format("  - {{{}}}\n", fmt::join(parts, ", "));
 }
 
+/// Numbers of a row of the covariance factor. \param scale  they are whole multiples of it; 0: any
+std::string covariance_row_text(const Eigen::VectorXd& row, double scale) {
+  std::string text;
+  for (Eigen::Index k = 0; k < row.size(); ++k) {
+    if (k > 0) text += scale > 0 ? "," : ", ";  // several curves have 100,000 of them: no spaces
+    text += scale > 0 ? fmt::format("{}", std::lround(row[k] / scale))
+                      : yaml_number(fmt::format("{:.9g}", row[k]));
+  }
+  return text;
+}
+
+std::string covariance_text(const CovarianceFactor& covariance) {
+  const Eigen::Index count = covariance.factor.rows();
+  const bool is_compact = covariance.own.size() > 0 || covariance.scale.size() > 0;
+  const Eigen::VectorXd none_at_all = Eigen::VectorXd::Zero(count);
+  const Eigen::VectorXd& own = covariance.own.size() > 0 ? covariance.own : none_at_all;
+  const Eigen::VectorXd& scale = covariance.scale.size() > 0 ? covariance.scale : none_at_all;
+  // Without any of these keys a reader expects a lower triangle.
+  const bool is_told = (own.array() > 0).any() || (scale.array() > 0).any();
+  std::string text = "covariance_factor:  # covariance = factor * factor^T";
+  text += is_compact ? " + diag(own^2), SI units (m, rad, rad/(N m)); factor = scale * row, then zeros\n"
+                     : ", SI units (m, rad, rad/(N m)); lower triangle\n";
+  for (Eigen::Index r = 0; r < count; ++r) {
+    Eigen::Index size = is_compact ? covariance.factor.cols() : r + 1;
+    while (is_compact && size > 0 && covariance.factor(r, size - 1) == 0) --size;
+    text +=
+        fmt::format("  - {{parameter: {}, ", yaml_quoted(covariance.parameters[static_cast<std::size_t>(r)]));
+    if (scale[r] > 0) text += fmt::format("scale: {}, ", number(scale[r], unit::si));
+    text += fmt::format("row: [{}]", covariance_row_text(covariance.factor.row(r).head(size), scale[r]));
+    if (own[r] > 0 || (is_compact && !is_told && r == 0))
+      text += fmt::format(", own: {}", sigma_number(own[r], unit::si));
+    text += "}\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 Calibration load_calibration(const std::string& path, const Robot& robot) {
@@ -529,19 +603,7 @@ std::string calibration_text(const Calibration& c, const Robot& robot) {
   if (!c.residuals.empty()) text += "residuals:\n";
   for (const auto& [key, value] : c.residuals)
     text += fmt::format("  {}: {}\n", key, number(value, unit::si));
-  if (c.covariance) {
-    text +=
-        "covariance_factor:  # covariance = factor * factor^T, SI units (m, rad, rad/(N m)); lower "
-        "triangle\n";
-    for (Eigen::Index r = 0; r < c.covariance->factor.rows(); ++r) {
-      std::vector<std::string> row;
-      for (Eigen::Index k = 0; k <= r; ++k)
-        row.push_back(yaml_number(fmt::format("{:.9g}", c.covariance->factor(r, k))));
-      text += fmt::format("  - {{parameter: {}, row: [{}]}}\n",
-                          yaml_quoted(c.covariance->parameters[static_cast<std::size_t>(r)]),
-                          fmt::join(row, ", "));
-    }
-  }
+  if (c.covariance) text += covariance_text(*c.covariance);
   return text;
 }
 

@@ -35,6 +35,18 @@ std::string describe(const YAML::Node& node) {
   }
 }
 
+template <class Integer>
+Integer integer_of(const YamlField& field, const YAML::Node& node, Integer least, Integer most) {
+  Integer value = 0;
+  const std::string& text = node.IsScalar() ? node.Scalar() : std::string();
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || failure != std::errc() || end != text.data() + text.size() || value < least ||
+      value > most) {
+    throw field.error(fmt::format("an integer from {} to {}", least, most));
+  }
+  return value;
+}
+
 /// Where the first node of a document stands.
 class FirstNode : public YAML::EventHandler {
  public:
@@ -182,15 +194,10 @@ bool YamlField::boolean() const {
 }
 
 unsigned YamlField::integer(unsigned least, unsigned most) const {
-  unsigned value = 0;
-  const std::string& text = node_.IsScalar() ? node_.Scalar() : std::string();
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || failure != std::errc() || end != text.data() + text.size() || value < least ||
-      value > most) {
-    throw error(fmt::format("an integer from {} to {}", least, most));
-  }
-  return value;
+  return integer_of(*this, node_, least, most);
 }
+
+int YamlField::whole_number(int largest) const { return integer_of(*this, node_, -largest, largest); }
 
 Eigen::Vector3d YamlField::vector3(const Unit& unit) const {
   if (!node_.IsSequence() || node_.size() != 3) throw error("a list of three numbers");

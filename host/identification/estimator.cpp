@@ -65,13 +65,29 @@ struct Quadratic {
   }
 };
 
+/// Inverse of a positive semidefinite matrix of which the lower triangle is given; by BLAS where it can be.
+Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& a) {
+  Eigen::MatrixXd factor = a;
+  return factor_in_place(factor) ? inverse_of_factored(factor) : Ldlt(a).inverse();
+}
+
+/// Solution of a x = b, a as before.
+Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  Eigen::MatrixXd factor = a;
+  if (!factor_in_place(factor)) return Ldlt(a).solve(b);
+  Eigen::MatrixXd x = b;
+  solve_lower(factor, x);
+  solve_lower_transposed(factor, x);
+  return x;
+}
+
 /// Minimum of the damped quadratic within the bounds by an active set, Eq. (M37). Few parameters are bounded,
 /// so it ends after a few rounds; the limit of 100 guards against cycling by rounding.
 Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
   const Eigen::Index n = q.gradient.size();
   Eigen::MatrixXd damped = q.normal;
   damped.diagonal().array() += mu;
-  Eigen::VectorXd dx = Ldlt(damped).solve(q.gradient);
+  Eigen::VectorXd dx = solve_symmetric(damped, q.gradient);
   if ((dx.array() >= q.least.array()).all()) return dx;
   std::vector<bool> active(static_cast<std::size_t>(n), false);
   damped = damped.selfadjointView<Eigen::Lower>();
@@ -110,15 +126,9 @@ Eigen::VectorXd bounded_step(const Quadratic& q, double mu) {
       reduced(i, i) = 1;
       right[i] = q.least[i];
     }
-    dx = Ldlt(reduced).solve(right);
+    dx = solve_symmetric(reduced, right);
   }
   return dx.cwiseMax(q.least);
-}
-
-/// Inverse of a positive semidefinite matrix of which the lower triangle is given; by BLAS where it can be.
-Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& a) {
-  Eigen::MatrixXd factor = a;
-  return factor_in_place(factor) ? inverse_of_factored(factor) : Ldlt(a).inverse();
 }
 
 /// An estimate with its residuals, their derivative and their squares per row.
@@ -358,7 +368,7 @@ void add_uncertainty(const Objective& objective, const Quadratic& quadratic, con
     // The declared noise does not explain the residuals: their own variance scales the covariance.
     out.covariance *= out.chi2 / out.degrees_of_freedom;
   }
-  const Eigen::VectorXd to_unbounded = Ldlt(normal).solve(quadratic.gradient);
+  const Eigen::VectorXd to_unbounded = solve_symmetric(normal, quadratic.gradient);
   for (std::size_t p = 0; p < unknowns.parameters.size(); ++p) {
     const Eigen::Index i = frames + static_cast<Eigen::Index>(p);
     const double value = unknowns.parameters[p].get(out.estimate.set);

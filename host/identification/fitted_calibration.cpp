@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "linalg/decompositions.hpp"
+#include "identification/covariance_factor.hpp"
 
 namespace flexcomp::host {
 
@@ -39,12 +39,13 @@ void copy_identified_terms(Calibration& calibration, const TermSet& set, const U
 
 }  // namespace
 
-Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot) {
+Calibration fitted_calibration(const Fit& fit, const Unknowns& fitted, const Robot& robot,
+                               const std::vector<Observation>& rows) {
   Calibration out;
   const Eigen::VectorXd units = units_of(fitted, fit.estimate.set);
   const Eigen::VectorXd sigma = fit.covariance.diagonal().cwiseMax(0).cwiseSqrt().cwiseProduct(units);
   copy_identified_terms(out, fit.estimate.set, fitted, sigma);
-  out.covariance = CovarianceFactor{names_of(fitted), units.asDiagonal() * Llt(fit.covariance).lower()};
+  out.covariance = covariance_factor(fit, fitted, robot, rows);
   if (!fitted.frames.empty())
     out.frames = MeasurementFrames{Frame::of(fit.estimate.f), Frame::of(fit.estimate.e)};
   for (std::size_t p = 0; p < fitted.parameters.size(); ++p) {

@@ -180,7 +180,7 @@ Identification identify(const Robot& robot, const std::vector<Observation>& rows
   }
   if (fitted.count() > 0) out.pure_error = pure_error(inliers, out.fit.chi2, out.fit.degrees_of_freedom);
 
-  out.calibration = fitted_calibration(out.fit, fitted, robot);
+  out.calibration = fitted_calibration(out.fit, fitted, robot, rows);
   if (!fit_frames_too) require_small_base(out.calibration, source);
   out.calibration.confounded = out.identifiability.confounded;
   out.calibration.residuals = {{"before_mean_mm", out.before.nominal_frames.mean_m * 1e3},

@@ -8,13 +8,15 @@
 
 #include "identification/fitted_calibration.hpp"
 #include "input_error.hpp"
+#include "linalg/blas.hpp"
 #include "linalg/decompositions.hpp"
 
 namespace flexcomp::host {
 
 namespace {
 
-/// Chi-square r^T (1 + A A^T)^-1 r by the Woodbury identity, Eq. (M42); A = whitened derivative * covariance factor.
+/// Chi-square r^T (1 + A A^T)^-1 r by the Woodbury identity, Eq. (M42); A = whitened derivative * columns of the
+/// covariance.
 double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& model,
                                    const std::vector<Observation>& rows, const Calibration& calibration,
                                    const Robot& robot) {
@@ -38,9 +40,9 @@ double chi_square_with_uncertainty(const Estimate& estimate, const HostModel& mo
   if (static_cast<std::size_t>(covariance.factor.rows()) != unknowns.count())
     return lin.residual.squaredNorm();
   const Eigen::VectorXd units = units_of(unknowns, estimate.set);
-  const Eigen::MatrixXd a = lin.derivative * (units.cwiseInverse().asDiagonal() * covariance.factor);
+  const Eigen::MatrixXd a = product(lin.derivative, units.cwiseInverse().asDiagonal() * covariance.columns());
   const Eigen::VectorXd ar = a.transpose() * lin.residual;
-  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(a.cols(), a.cols()) + a.transpose() * a;
+  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(a.cols(), a.cols()) + gram(a);
   return lin.residual.squaredNorm() - ar.dot(Llt(inner).solve(ar));
 }
 

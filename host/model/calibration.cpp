@@ -4,6 +4,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <cmath>
 #include <ctime>
 
 #include "quaternion.hpp"
@@ -11,6 +12,19 @@
 namespace flexcomp::host {
 
 Frame Frame::of(const Pose<double>& pose) { return {pose.position, unit_quaternion(pose.rotation)}; }
+
+double CovarianceFactor::sigma(Eigen::Index parameter) const {
+  const double shared = factor.row(parameter).norm();
+  return own.size() == 0 ? shared : std::hypot(shared, own[parameter]);
+}
+
+Eigen::MatrixXd CovarianceFactor::columns() const {
+  if (own.size() == 0) return factor;
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(factor.rows(), factor.cols() + own.size());
+  out.leftCols(factor.cols()) = factor;
+  out.rightCols(own.size()).diagonal() = own;
+  return out;
+}
 
 std::string hex(const Sha256Digest& digest) {
   std::string text;

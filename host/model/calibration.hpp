@@ -29,11 +29,18 @@ struct AtBound {
   double upper_95 = 0;  ///< SI: end of the one-sided 95 % interval
 };
 
-/// Joint uncertainty of all that was fitted (frames first): covariance = factor * factor^T, SI. The standard deviations
+/// Joint uncertainty of all that was fitted: covariance = factor * factor^T + diag(own^2), SI. The standard deviations
 /// alone would not do: what two near-confounded parameters lack in common cancels in the pose that they predict.
 struct CovarianceFactor {
   std::vector<std::string> parameters;  ///< frame_f.x_mm … frame_e.rz_deg, then parameters by name
-  Eigen::MatrixXd factor;               ///< lower triangular, one row per parameter
+  Eigen::MatrixXd factor;               ///< one row per parameter; lower triangular where `own` is empty
+  Eigen::VectorXd own = {};    ///< standard deviation of what the factor leaves out; empty: nothing is
+  Eigen::VectorXd scale = {};  ///< of which a row's numbers are whole multiples; 0: of none. Empty: all 0
+
+  /// Standard deviation of one parameter, SI.
+  double sigma(Eigen::Index parameter) const;
+  /// A with covariance = A A^T: the factor with the diagonal of `own` as further columns.
+  Eigen::MatrixXd columns() const;
 };
 
 struct Calibration {

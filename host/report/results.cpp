@@ -73,7 +73,7 @@ void add_frames(Page& page, const Calibration& calibration) {
         const auto& known = calibration.covariance->parameters;
         const auto row = std::ranges::find(known, shown.name);
         if (row == known.end()) continue;
-        const double sigma = calibration.covariance->factor.row(row - known.begin()).norm();
+        const double sigma = calibration.covariance->sigma(row - known.begin());
         shown.sigma = i < 3 ? sigma * 1e3 : degrees(sigma);
       }
       page.parameters.push_back(shown);

@@ -14,7 +14,8 @@ namespace {
 using namespace flexcomp::host;
 
 /// As `identify` writes it: with standard deviations, the geometry's hash, the date, the covariance and what was not told apart.
-std::string identified() {
+/// \param is_compact  the covariance with a diagonal and a row of whole numbers
+std::string identified(bool is_compact) {
   Calibration c =
       load_calibration(path_of(file_of("tests/data/tx60l_table1.yaml") +
                                "  - {effect: joint_curve, joint: 1, coefficients_rad: [0, 1.0e-4, 0, "
@@ -27,6 +28,10 @@ std::string identified() {
   CovarianceFactor covariance;
   covariance.parameters = {"link1.theta", "link2.theta"};
   covariance.factor = Eigen::MatrixXd::Identity(2, 2) * 1e-6;
+  if (is_compact) {
+    covariance.own = Eigen::Vector2d(0, 2e-6);
+    covariance.scale = Eigen::Vector2d(0, 1e-8);
+  }
   c.covariance = covariance;
   c.confounded.push_back({"base.rz", {"link1.theta"}});
   c.at_bound.push_back({"joint_compliance[2]", 1e-7});
@@ -86,7 +91,8 @@ std::vector<Bytes> seeds() {
                "values_rad: [[0, 1], [2, 0]]}\n"
                "  - {effect: thermal_growth, link: 4, per_k: 1.0e-6}\n"
                "frames: {f: {xyz_mm: [1, 2, 3], quaternion_wxyz: [1, 0, 0, 0]}, e: {xyz_mm: [1, 2, 3]}}\n"));
-  all.push_back(bytes_of(identified()));
+  all.push_back(bytes_of(identified(false)));
+  all.push_back(bytes_of(identified(true)));
   // Every example of the list of effects.
   const std::string page = file_of("docs/effects.md");
   std::string effects = "effects:\n";

@@ -175,8 +175,10 @@ TEST(EffectProfile, TheBandIsTheCovariance) {
                            hidden.parameters[0].name};  // any order
   covariance.factor = Eigen::MatrixXd::Zero(3, 3);
   covariance.factor << 1e-3, 0, 0, 2e-6, 5e-6, 0, -1e-6, 3e-6, 4e-6;
+  covariance.own = Eigen::Vector3d(1e-4, 3e-6, 2e-6);
   hidden.after.covariance = covariance;
-  const Eigen::MatrixXd full = covariance.factor * covariance.factor.transpose();
+  Eigen::MatrixXd full = covariance.factor * covariance.factor.transpose();
+  full.diagonal() += covariance.own.cwiseAbs2();
   const auto profile = profile_of(hidden.robot, hidden.after, hidden.id, hidden.rows(50, 3));
   ASSERT_TRUE(profile);
   // About its mean: a constant turn of the joint is geometry.

@@ -57,7 +57,7 @@ Calibration with_effects_of(const Calibration& other, const Identification& star
   const Estimate at{other.terms, start.fit.estimate.f, start.fit.estimate.e};
   const Fit moved = fit(at, unknowns, rows, arm.robot);
   EXPECT_TRUE(moved.converged);
-  return fitted_calibration(moved, unknowns, arm.robot);
+  return fitted_calibration(moved, unknowns, arm.robot, rows);
 }
 
 TEST(MeasuredArms, Ur5FromTheGridToTheSourcesRandomPoses) {

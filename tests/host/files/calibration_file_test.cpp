@@ -5,13 +5,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <ctime>
+#include <filesystem>
 #include <random>
 #include <utility>
 
 #include "flexcomp/image.hpp"
+#include "identification/fitted_calibration.hpp"
 #include "model/effects.hpp"
 #include "model/parameter_image.hpp"
+#include "support/curved_fit.hpp"
 #include "support/robot_files.hpp"
 #include "support/text_file.hpp"
 
@@ -101,6 +106,95 @@ TEST(CalibrationFile, OneDocumentAndEachParameterOfTheCovarianceOnce) {
   refused("robot: staubli-tx60l\n---\nrobot: another\n", 3, "", {"one YAML document"});
   // What is left behind a document, which yaml-cpp's own list of documents never ends with.
   EXPECT_THROW(load("\",\"\nname: Pose\ntime: {cem\"}\n"), InputError);
+}
+
+/// Rows of a low-rank factor: two dense ones, two of whole numbers.
+const std::string compact =
+    "covariance_factor:\n"                                                         // 1
+    "  - {parameter: link1.d_mm, row: [1.0e-6]}\n"                                 // 2
+    "  - {parameter: a_curve, scale: 2.5e-9, row: [-12, 3, 0, 7], own: 3.0e-6}\n"  // 3
+    "  - {parameter: link1.theta_deg, row: [5.0e-7, 2.0e-6], own: 0}\n"            // 4
+    "  - {parameter: another, scale: 1.0e-8, row: []}\n"                           // 5
+    "robot: staubli-tx60l\n";                                                      // 6
+
+TEST(CalibrationFile, ReadsALowRankFactor) {
+  const Calibration c = load(compact);
+  ASSERT_TRUE(c.covariance);
+  ASSERT_EQ(c.covariance->factor.rows(), 4);
+  ASSERT_EQ(c.covariance->factor.cols(), 4);
+  EXPECT_EQ(c.covariance->factor.row(0), Eigen::RowVector4d(1e-6, 0, 0, 0));
+  EXPECT_EQ(c.covariance->factor.row(1), Eigen::RowVector4d(-12 * 2.5e-9, 3 * 2.5e-9, 0, 7 * 2.5e-9));
+  EXPECT_EQ(c.covariance->factor.row(2), Eigen::RowVector4d(5e-7, 2e-6, 0, 0));
+  EXPECT_EQ(c.covariance->factor.row(3), Eigen::RowVector4d::Zero());
+  EXPECT_EQ(c.covariance->own, Eigen::Vector4d(0, 3e-6, 0, 0));
+  EXPECT_EQ(c.covariance->scale, Eigen::Vector4d(0, 2.5e-9, 0, 1e-8));
+  const std::string text = calibration_text(c, tx60l());
+  EXPECT_THAT(text, HasSubstr("scale: 2.5e-09, row: [-12,3,0,7], own: 3.0e-06}"));
+  EXPECT_EQ(calibration_text(load(text), tx60l()), text);
+  // `own` alone says that the rows need not be a lower triangle, even where it is zero.
+  const Calibration zero = load(
+      "covariance_factor:\n  - {parameter: a, row: [1.0e-6, 2.0e-6], own: 0}\n"
+      "  - {parameter: b, row: []}\n");
+  const std::string again = calibration_text(zero, tx60l());
+  EXPECT_EQ(load(again).covariance->factor, zero.covariance->factor);
+  EXPECT_EQ(calibration_text(load(again), tx60l()), again);
+}
+
+TEST(CalibrationFile, RefusesAWrongLowRankFactor) {
+  const auto wrong = [](const std::string& from, const std::string& to, std::size_t line,
+                        const std::string& field, const std::vector<std::string>& parts = {}) {
+    refused(replaced(compact, from, to), line, "covariance_factor" + field, parts);
+  };
+  wrong("[-12, 3, 0, 7]", "[-12, 3, 0, 7, 1]", 3, "[2].row", {"at most 4 numbers", "5"});
+  wrong("[1.0e-6]", "[1, 2, 3, 4, 5]", 2, "[1].row", {"at most 4 numbers", "5"});
+  wrong("[-12, 3", "[-12, 3.5", 3, "[2].row[2]", {"an integer from -999999 to 999999", "'3.5'"});
+  wrong("[-12, 3", "[-1000000, 3", 3, "[2].row[1]", {"an integer from -999999 to 999999"});
+  wrong("[-12, 3", "[-12, three", 3, "[2].row[2]", {"an integer"});
+  wrong("[-12, 3", "[[-12], 3", 3, "[2].row[1]", {"an integer", "a list of 1"});
+  wrong("row: [-12, 3, 0, 7]", "row: 7", 3, "[2].row", {"a list"});
+  wrong("row: [-12, 3, 0, 7], ", "", 3, "[2].row", {"this key"});
+  wrong("[5.0e-7, 2.0e-6]", "[5.0e-7, .inf]", 4, "[3].row[2]", {"a finite number"});
+  wrong("2.5e-9", "0", 3, "[2].scale", {"a number above 0", "'0'"});
+  wrong("2.5e-9", "-2.5e-9", 3, "[2].scale", {"a number above 0"});
+  wrong("2.5e-9", ".inf", 3, "[2].scale", {"a finite number"});
+  wrong("2.5e-9", ".nan", 3, "[2].scale", {"a finite number"});
+  wrong("2.5e-9", "1.0e+308", 3, "[2].row[1]", {"a finite number, times scale"});
+  wrong("own: 3.0e-6", "own: -3.0e-6", 3, "[2].own", {"a standard deviation of 0 or more", "'-3.0e-6'"});
+  wrong("own: 3.0e-6", "own: .nan", 3, "[2].own", {"a finite number"});
+  wrong("own: 3.0e-6", "own: 3.0e-6, own: 0", 3, "[2].own", {"each key once"});
+  wrong("scale: 1.0e-8", "scale: 1.0e-8, scale: 1.0e-8", 5, "[4].scale", {"each key once"});
+  wrong("own: 3.0e-6", "owns: 3.0e-6", 3, "[2].owns", {"did you mean 'own'"});
+  wrong("another", "a_curve", 5, "[4].parameter", {"each parameter once"});
+  // Without the keys of a low-rank factor a lower triangle, as ever.
+  refused("covariance_factor:\n  - {parameter: a, row: [1]}\n  - {parameter: b, row: [1]}\n", 3,
+          "covariance_factor[2]", {"2 numbers: a lower triangle", "1"});
+}
+
+TEST(CalibrationFile, OfSixCurvesIsSmallAndQuicklyRead) {
+  const support::CurvedFit many(tx60l(), 100);
+  const Calibration c = fitted_calibration(many.fit, many.unknowns, many.robot, many.rows);
+  ASSERT_EQ(c.covariance->parameters.size(), 6 * curve_coefficients + 45);
+  const std::string path = support::path_of("six_curves.yaml");
+  save_calibration(path, c, tx60l());
+  const auto bytes = std::filesystem::file_size(path);
+  const std::clock_t begin = std::clock();
+  const Calibration again = load_calibration(path, tx60l());
+  const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  std::printf("  six curves: %zu bytes, read in %.2f s\n", static_cast<std::size_t>(bytes), seconds);
+  EXPECT_LE(bytes, 500'000U);
+#if !defined(__SANITIZE_ADDRESS__)
+  EXPECT_LT(seconds, 0.8);
+#endif
+  EXPECT_EQ(calibration_text(again, tx60l()), support::read(path));
+  // The curves' rows are read to the last bit; the others have nine digits, `own` six.
+  ASSERT_EQ(again.covariance->factor.cols(), c.covariance->factor.cols());
+  EXPECT_EQ(again.covariance->scale, c.covariance->scale);
+  EXPECT_EQ(again.covariance->factor.bottomRows(768), c.covariance->factor.bottomRows(768));
+  for (Eigen::Index i = 0; i < c.covariance->factor.rows(); ++i) {
+    EXPECT_NEAR(again.covariance->sigma(i) / c.covariance->sigma(i), 1, 1e-5);
+    EXPECT_NEAR((again.covariance->factor.row(i) - c.covariance->factor.row(i)).norm(), 0,
+                1e-8 * c.covariance->sigma(i));
+  }
 }
 
 TEST(CalibrationFile, ReadsEveryKeyOfTheCatalogue) {

@@ -721,6 +721,10 @@ TEST(Report, FramesAreAmongTheParameters) {
   EXPECT_NEAR(find("frame_f.rz_deg").sigma.value(), 0.004, 1e-9);
   EXPECT_NEAR(find("frame_e.z_mm").sigma.value(), 0.05, 1e-9);
   EXPECT_EQ(find("frame_e.rz_deg").name, "none") << "was not fitted";
+  calibration.covariance->own = Eigen::Vector3d(4e-5, 0, 0);
+  page.parameters.clear();
+  add_parameters(page, calibration, support::tx60l());
+  EXPECT_NEAR(find("frame_f.x_mm").sigma.value(), 0.05, 1e-9) << "with what the factor leaves out";
 }
 
 TEST(Report, OneStepIsNoCourse) {
