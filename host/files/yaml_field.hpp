@@ -48,7 +48,7 @@ class YamlField {
   double number(const Unit& unit) const;
   double number(const Unit& unit, double above, const std::string& expected) const;  ///< greater than `above`
   unsigned integer(unsigned least, unsigned most) const;
-  bool boolean() const;  ///< true or false
+  bool boolean() const;                 ///< true or false
   int whole_number(int largest) const;  ///< of either sign
   Eigen::Vector3d vector3(const Unit& unit) const;
   /// w x y z; norm within 1e-3 of 1, normalised, w >= 0

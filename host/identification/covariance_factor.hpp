@@ -20,7 +20,7 @@ constexpr Eigen::Index exact_parameters = 150;
 /// columns for six curves of 128 coefficients, which a file of 500 kB holds.
 constexpr Eigen::Index curve_numbers = Eigen::Index{120} * 6 * 128;
 
-/// Factor of the covariance (M40) of a fit: Cholesky's, or with partial pivoting over the coefficients of curves (M52), SI.
+/// Factor of the covariance (M40) of a fit: Cholesky's, or with partial pivoting over the coefficients of curves (M53), SI.
 /// \param rows  that were fitted: the pose that is predicted near them must keep its uncertainty
 CovarianceFactor covariance_factor(const Fit& fit, const Unknowns& fitted, const Robot& robot,
                                    const std::vector<Observation>& rows);
