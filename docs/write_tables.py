@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Writes the figures of docs/figures.json into the tables of README.md and docs/*.md.
+"""Writes the figures of docs/figures.json into the tables of README.md and docs/*.md, and draws those that are drawn.
 
-  docs/write_tables.py           writes every table anew
-  docs/write_tables.py --check   exit status 1 where a table is not what would be written
+  docs/write_tables.py           writes every table and picture anew
+  docs/write_tables.py --check   exit status 1 where a table or picture is not what would be written
 
 A table stands between <!-- figures: NAME --> and <!-- end -->, each on a line of its own; TABLES has the names. Every
 row of figures.json is data: numbers where something computes with them, text where only people read them.
@@ -15,6 +15,9 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FIGURES = ROOT / "docs" / "figures.json"
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "docs" / "pictures"))
+import slope_curve  # noqa: E402
 TARGETS = ["cortex-m7", "cortex-m4f", "cortex-r5f"]
 
 
@@ -79,7 +82,10 @@ def in_a_controller(figures):
             for t in TARGETS)]])
 
 
+PICTURES = {"slope.svg": lambda f: slope_curve.svg(f["slope_against_residual"]["rows"])}
+
 TABLES = {
+    "slope_against_residual": lambda f: grid(*slope_curve.table(f["slope_against_residual"]["rows"])),
     "target_bytes": lambda f: of_targets(f["target_bytes"]["rows"]),
     "target_instructions": lambda f: of_targets(f["target_instructions"]["rows"]),
     "in_a_controller": in_a_controller,
@@ -109,6 +115,17 @@ def main(arguments=None):
     figures = load(args.root / "docs" / "figures.json")
     tables = {name: table(figures) for name, table in TABLES.items()}
     stale, found = 0, set()
+    for name, picture in PICTURES.items():
+        path = args.root / "docs" / "pictures" / name
+        new = picture(figures)
+        if path.exists() and path.read_text(encoding="utf-8") == new:
+            continue
+        if args.check:
+            stale += 1
+            print(f"docs/pictures/{name} is not that of docs/figures.json; docs/write_tables.py draws it")
+        else:
+            path.write_text(new, encoding="utf-8")
+            print(f"docs/pictures/{name}: written")
     for page in [args.root / "README.md", *sorted((args.root / "docs").glob("**/*.md"))]:
         old = page.read_text(encoding="utf-8")
         new = written(old, tables, found)

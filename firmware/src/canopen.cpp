@@ -346,7 +346,7 @@ std::uint32_t CanopenNode::set_pdo(std::uint8_t sub, const std::uint8_t* bytes) 
 /// where it varies. Image and robot are read by the server.
 std::uint32_t CanopenNode::get(SdoServer& by, std::uint16_t index, std::uint8_t sub, std::uint32_t& size,
                                std::uint8_t* out) {
-  const ClientObjects& client = by.objects();
+  ClientObjects& client = by.objects();
   std::uint32_t number = 0;
   switch (index) {
     case co::device_type:
@@ -433,14 +433,16 @@ std::uint32_t CanopenNode::get(SdoServer& by, std::uint16_t index, std::uint8_t 
       number = sub == 0 ? 2U : sub == co::command_argument ? client.argument : client.command;
       break;
     case co::probe:
-      number = 2;
-      if (sub == 0) break;
+      number = sub == 0 ? 3U : client.probe_flags;
+      if (sub == 0 || sub == co::probe_flags) break;
       if (sub == co::probe_request) {
         std::memcpy(out, client.probe_request.data(), size);
       } else if (client.is_asked) {
         wire::ProbeRequest request;
         wire::decode(client.probe_request.data(), ByteOrder::little, request);
-        wire::encode(device_.probe(request), ByteOrder::little, out);
+        const wire::ProbeResponse response = device_.probe(request);
+        wire::encode(response, ByteOrder::little, out);
+        client.probe_flags = response.flags;
       } else {
         std::memset(out, 0, size);
       }

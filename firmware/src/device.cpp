@@ -178,11 +178,13 @@ wire::ProbeResponse Device::probe(const wire::ProbeRequest& request) const {
   const FirmwareModel* model = store_.active_model();
   if (model == nullptr) {
     out.status = static_cast<std::uint16_t>(StepStatus::no_set);
+    out.flags = step_flag::no_set;
     return out;
   }
   Compensated<Scalar, joints> compensated;
   corrected_command(*model, q, context, cycle_.settings().compensation, compensated);
   out.status = static_cast<std::uint16_t>(compensated.status);
+  out.flags = compensated.flags;
   if (compensated.status == StepStatus::refused) return out;
   const RemainingError<Scalar> residual = remaining_error(*model, compensated.q, q, context);
   for (std::size_t j = 0; j < joints; ++j) out.q_rad[j] = to_binary64_bits(compensated.q[j]);
@@ -197,7 +199,7 @@ wire::Capability Device::capability() const {
   c.scalar_bytes = static_cast<std::uint16_t>(sizeof(Scalar));
   c.schema = static_cast<std::uint16_t>((image::schema_major << 8U) | image::schema_minor);
   c.bases = (1U << basis_count) - 1U;
-  c.flags = wire::capability_flag::unit;
+  c.flags = wire::capability_flag::unit | wire::capability_flag::probe_flags;
   c.terms = static_cast<std::uint16_t>(FirmwareCapacity::terms);
   c.tables = static_cast<std::uint16_t>(FirmwareCapacity::tables);
   c.values = static_cast<std::uint32_t>(FirmwareCapacity::values);

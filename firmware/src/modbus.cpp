@@ -158,6 +158,9 @@ Exception ModbusServer::read(std::uint32_t address, std::uint32_t quantity, std:
       case Block::probe_response:
         from = probe_response_.data();
         break;
+      case Block::probe_flags:
+        put16(scratch, probe_flags_);
+        break;
       case Block::corrections:
         for (std::size_t k = 0; k < map::corrections_registers / 2; ++k) {
           const float v = device_.correction_deg(k);
@@ -224,13 +227,16 @@ Exception ModbusServer::apply(std::uint32_t address, std::uint32_t quantity, con
       wire::ProbeRequest request;
       wire::decode(probe_request_.data(), wire::ByteOrder::big, request);
       if (trigger_ == map::trigger_default_context) request = device_.with_default_context(request);
-      wire::encode(device_.probe(request), wire::ByteOrder::big, probe_response_.data());
+      const wire::ProbeResponse response = device_.probe(request);
+      wire::encode(response, wire::ByteOrder::big, probe_response_.data());
+      probe_flags_ = response.flags;
       return Exception::none;
     }
     case Block::capability:
     case Block::status:
     case Block::reading_window:
     case Block::probe_response:
+    case Block::probe_flags:
     case Block::corrections:
     case Block::robot:
     case Block::certificate:
@@ -421,6 +427,7 @@ void ModbusServer::disconnect() {
   trigger_ = 0;
   probe_request_ = {};
   probe_response_ = {};
+  probe_flags_ = 0;
 }
 
 // --- RTU ----------------------------------------------------------------------------------------------

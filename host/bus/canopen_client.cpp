@@ -132,9 +132,14 @@ class CanopenClient final : public ControllerClient {
     return upload({co::image, co::image_active}, size, progress);
   }
 
-  Bytes exchange_probe(std::span<const std::uint8_t> request) override {
+  Bytes exchange_probe(std::span<const std::uint8_t> request, bool with_flags) override {
     download({co::probe, co::probe_request}, request);
-    return upload({co::probe, co::probe_response}, wire::probe_response_bytes);
+    Bytes out = upload({co::probe, co::probe_response}, wire::probe_response_bytes);
+    if (with_flags) {
+      const Bytes flags = upload({co::probe, co::probe_flags}, 2);
+      out.insert(out.end(), flags.begin(), flags.end());
+    }
+    return out;
   }
 
  private:

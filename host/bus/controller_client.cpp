@@ -375,13 +375,42 @@ Bytes ControllerClient::active_image(const Progress& progress) {
   throw BusError(where_, "the active set changed each of the three times that it was read");
 }
 
+namespace {
+
+/// The flag that a status stands for; for one that this version does not know, one that it does not know either.
+std::uint16_t flags_of(std::uint16_t status) {
+  switch (static_cast<StepStatus>(status)) {
+    case StepStatus::ok:
+      return 0;
+    case StepStatus::near_singular:
+      return step_flag::near_singular;
+    case StepStatus::limited:
+      return step_flag::limited;
+    case StepStatus::at_limit:
+      return step_flag::at_limit;
+    case StepStatus::no_set:
+      return step_flag::no_set;
+    case StepStatus::refused:
+      return step_flag::refused;
+  }
+  return 1U << step_flag::count;
+}
+
+}  // namespace
+
 wire::ProbeResponse ControllerClient::probe(const wire::ProbeRequest& request) {
   std::array<std::uint8_t, wire::probe_request_bytes> question{};
   wire::encode(request, byte_order(), question.data());
   Bytes bytes;
-  retry_while_busy("answer a probe", [&] { bytes = exchange_probe(question); });
+  const bool with_flags = (capability_.flags & wire::capability_flag::probe_flags) != 0;
+  retry_while_busy("answer a probe", [&] { bytes = exchange_probe(question, with_flags); });
   wire::ProbeResponse out;
   wire::decode(bytes.data(), byte_order(), out);
+  if (with_flags) {
+    wire::detail::Reader(bytes.data() + wire::probe_response_bytes, byte_order())(out.flags);
+  } else {
+    out.flags = flags_of(out.status);
+  }
   return out;
 }
 

@@ -129,6 +129,7 @@ class ControllerClient {
   /// Reads the active image, consistent: the same set was active before and after. Empty where there is none.
   Bytes active_image(const Progress& progress = {});
 
+  /// Asks for the corrected command. Flags are those of the status where the controller tells no others.
   wire::ProbeResponse probe(const wire::ProbeRequest& request);
 
  protected:
@@ -154,7 +155,8 @@ class ControllerClient {
   virtual void send_image(std::span<const std::uint8_t> image, const Progress& progress) = 0;
   virtual void send_command(wire::Command command, std::uint32_t argument) = 0;
   virtual Bytes read_image(std::size_t size, const Progress& progress) = 0;
-  virtual Bytes exchange_probe(std::span<const std::uint8_t> request) = 0;
+  /// The probe response record; where `with_flags`, its flags (u16) behind it.
+  virtual Bytes exchange_probe(std::span<const std::uint8_t> request, bool with_flags) = 0;
 
   /// Number of the connection: what was sent over an earlier one may still arrive. 0 where the bus keeps the order.
   virtual unsigned connection() const { return 0; }

@@ -132,12 +132,15 @@ class ModbusClient final : public ControllerClient {
     return out;
   }
 
-  Bytes exchange_probe(std::span<const std::uint8_t> request) override {
+  Bytes exchange_probe(std::span<const std::uint8_t> request, bool with_flags) override {
     std::array<std::uint16_t, map::probe_request_registers + 1> question{};
     static_assert(map::probe_trigger == map::probe_request + map::probe_request_registers);
     set_register({question.data(), map::probe_request_registers}, request);
     question.back() = map::trigger_request;
-    std::array<std::uint16_t, map::probe_response_registers> answer{};
+    // The flags follow the response.
+    static_assert(map::probe_flags == map::probe_response + map::probe_response_registers);
+    std::array<std::uint16_t, map::probe_response_registers + 1> registers{};
+    const auto answer = std::span(registers).first(registers.size() - (with_flags ? 0 : 1));
     send("to answer a probe", attempts_, [&] {
       return modbus_write_and_read_registers(
           context_.get(), map::probe_request, static_cast<int>(question.size()), question.data(),

@@ -12,6 +12,14 @@
 
 namespace flexcomp::host {
 
+std::string status_words(std::uint16_t flags) {
+  std::vector<std::string> words;
+  for (unsigned bit = 0; bit < 16; ++bit) {
+    if ((flags >> bit & 1U) != 0) words.emplace_back(flag_name(bit));
+  }
+  return words.empty() ? name(StepStatus::ok) : fmt::format("{}", fmt::join(words, "+"));
+}
+
 std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& answers) {
   std::vector<std::string> cells;
   for (std::size_t j = 0; j < joint_count; ++j) cells.push_back(fmt::format("q{}_deg", j + 1));
@@ -24,7 +32,7 @@ std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& 
     for (const double q : a.q_rad) cells.push_back(format_si(q, unit::degree));
     cells.push_back(format_si(a.residual_m, unit::mm));
     cells.push_back(format_si(a.residual_rad, unit::degree));
-    cells.emplace_back(name(a.status));
+    cells.push_back(status_words(a.flags));
     for (const std::string& extra : targets.rows[k].extra) cells.push_back(csv_cell(extra));
     text += fmt::format("{}\n", fmt::join(cells, ","));
   }

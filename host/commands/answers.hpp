@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,9 @@
 #include "kinematics/compensated_targets.hpp"
 
 namespace flexcomp::host {
+
+/// Words of all flags that hold, joined by +; "ok" where none does.
+std::string status_words(std::uint16_t flags);
 
 /// Columns q1_deg … q6_deg, residual_mm, residual_deg, status, and those that were passed through.
 std::string answers_text(const TargetsFile& targets, const std::vector<Answer>& answers);

@@ -52,7 +52,7 @@ void Compensate::run() {
     if (answers[k].status == StepStatus::ok) continue;
     const std::string& target = programs.name(k);
     common.warn({fmt::format("{}:{}: {}{} is {}.", targets, list.rows[k].line, target,
-                             target.empty() ? "the target" : "", name(answers[k].status))});
+                             target.empty() ? "the target" : "", status_words(answers[k].flags))});
   }
   const Json summary = answers_summary(commands, answers);
   common.say(fmt::format(
@@ -75,11 +75,12 @@ void add_compensate(CLI::App& app) {
       "seed1_deg … seed6_deg; context columns as in data files. Or a program: KUKA .src .dat, ABB .mod, "
       "Stäubli .dtx")
       ->required();
-  add_value(
-      command, "-o,--output", options.out, "FILE",
-      "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status (ok "
-      "near_singular limited at_limit no_set refused); of a program, the program with its targets "
-      "corrected")
+  add_value(command, "-o,--output", options.out, "FILE",
+            "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status "
+            "(ok, or all "
+            "that hold of near_singular limited at_limit not_converged no_set refused, joined by +); of a "
+            "program, the "
+            "program with its targets corrected")
       ->required();
   options.programs.add_to(command);
   command.add_flag("--allow-unnamed", options.allow_unnamed, "Also use what was found but not understood");

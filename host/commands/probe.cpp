@@ -80,6 +80,7 @@ void Probe::run() const {
       answer.residual_m = double_of(response.position_m);
       answer.residual_rad = double_of(response.orientation_rad);
       answer.status = static_cast<StepStatus>(response.status);
+      answer.flags = response.flags;
       answers.push_back(answer);
       bar.show(k + 1, commands.size());
     }

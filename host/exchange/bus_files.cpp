@@ -27,11 +27,11 @@ namespace map = wire::modbus;
 
 // Of the contents: whoever changes them raises the revision and sets the date (tests/hil/bus_files_test.cpp notices). CiA 306-1
 // has MM-DD-YYYY and hh:mm(AM|PM).
-constexpr unsigned file_revision = 1;
+constexpr unsigned file_revision = 2;
 constexpr const char* creation_date = "11-21-2026";
 constexpr const char* creation_time = "03:56PM";
-constexpr const char* modification_date = "11-22-2026";
-constexpr const char* modification_time = "09:30PM";
+constexpr const char* modification_date = "11-23-2026";
+constexpr const char* modification_time = "01:30AM";
 
 constexpr unsigned variable_object = 7;
 constexpr unsigned domain_object = 2;

@@ -31,7 +31,7 @@ std::vector<Answer> compensated(const TargetsFile& targets,
     if (result.status != StepStatus::refused) {
       residual = remaining_error(*model, result.q, commands[k], context);
     }
-    answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status});
+    answers.push_back({result.q, residual.position_m, residual.orientation_rad, result.status, result.flags});
   }
   return answers;
 }

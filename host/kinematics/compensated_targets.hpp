@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "flexcomp/status.hpp"
@@ -18,6 +19,7 @@ struct Answer {
   double residual_m = 0;                    ///< what the flexible model still misses of the target
   double residual_rad = 0;
   StepStatus status = StepStatus::no_set;
+  std::uint16_t flags = step_flag::no_set;  ///< all that hold, bits of step_flag
 };
 
 /// \param commands  joint_commands() of the targets

@@ -186,9 +186,9 @@ struct Path {
   std::array<std::uint32_t, kernels> term;  ///< by kind
 };
 /// Sets whose terms all turn joints: at most seven evaluations.
-constexpr Path joints_only = {15800, 7500, 3500, 0, {0, 1000, 340, 1350, 900, 1150, 1700, 350, 250, 220, 40}};
+constexpr Path joints_only = {17500, 7500, 3500, 0, {0, 1020, 350, 1380, 920, 1180, 1740, 360, 260, 230, 40}};
 /// Sets that also move links, base or tool: at most six evaluations, each with the chain.
-constexpr Path off_joints = {28500, 7500, 0, 6000, {0, 1130, 620, 1400, 1245, 1450, 1900, 545, 250, 220, 40}};
+constexpr Path off_joints = {32000, 7500, 0, 6000, {0, 1160, 640, 1440, 1280, 1490, 1950, 560, 260, 230, 40}};
 
 /// True where the term turns the joint whose reading it follows.
 template <class S>

@@ -30,6 +30,7 @@ int usage() {
       "  --evaluations N   of search for each arm, in place of seconds\n"
       "  --seed N          of random numbers (1)\n"
       "  --steepest K      setting of the compensation (100)\n"
+      "  --largest C       largest correction of a joint, rad (0.1)\n"
       "  --scale X         times Table 1 (1)\n"
       "  --step H          of the differences, rad (5e-6)\n"
       "  --poses N         for the share with error left (20000)\n",
@@ -52,6 +53,8 @@ bool read(int argc, char** argv, Options& o) {
       o.seed = std::strtoull(value, nullptr, 10);
     } else if (name == "--steepest") {
       o.settings.steepest = std::strtod(value, nullptr);
+    } else if (name == "--largest") {
+      o.settings.largest_correction_rad = std::strtod(value, nullptr);
     } else if (name == "--scale") {
       o.scale = std::strtod(value, nullptr);
     } else if (name == "--step") {

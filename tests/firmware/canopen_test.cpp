@@ -292,10 +292,21 @@ TEST_F(Canopen, PushPullAndProbe) {
   wire::encode(request, wire::ByteOrder::little, record.data());
   ASSERT_EQ(download(co::probe, 1, record), 0U);
   EXPECT_EQ(upload(co::probe, 1), record);
+  EXPECT_EQ(number(co::probe, 0), 3U);
   wire::ProbeResponse answer;
   wire::decode(upload(co::probe, 2).data(), wire::ByteOrder::little, answer);
   const auto expected = by_the_core(arm.robot, image, q, default_context<Scalar>(arm.robot));
   for (std::size_t j = 0; j < joints; ++j) EXPECT_EQ(answer.q_rad[j], to_binary64_bits(expected.q[j]));
+
+  // The flags are those of the response that was read last.
+  EXPECT_EQ(number(co::probe, 3), 0U) << "nothing holds it back";
+  request.q_rad[4] = to_binary64_bits(Scalar(0));  // the wrist is straight
+  wire::encode(request, wire::ByteOrder::little, record.data());
+  ASSERT_EQ(download(co::probe, 1, record), 0U);
+  EXPECT_EQ(number(co::probe, 3), 0U) << "still of the one before";
+  upload(co::probe, 2);
+  EXPECT_EQ(upload(co::probe, 3), Bytes({step_flag::near_singular, 0}));
+  EXPECT_EQ(expedited(co::probe, 3, 0, 2), co::abort::read_only);
 
   // A set that changes during an upload ends it.
   ask(sdo_frame(0x40, co::image, 2));

@@ -51,6 +51,7 @@ TEST(Probe, EqualsTheCoreToTheLastBit) {
     const Compensated<Scalar, joints> expected = by_the_core(arm.robot, image, q, c);
     const wire::ProbeResponse r = arm.device->probe(request(q, c));
     ASSERT_EQ(r.status, static_cast<std::uint16_t>(expected.status));
+    ASSERT_EQ(r.flags, expected.flags);
     ASSERT_EQ(r.sequence, 3U);
     for (std::size_t j = 0; j < joints; ++j) ASSERT_EQ(r.q_rad[j], to_binary64_bits(expected.q[j]));
   }
@@ -60,12 +61,15 @@ TEST(Probe, SaysWhatItCannotDo) {
   Arm arm;
   const Joints q{};
   FirmwareContext c = default_context<Scalar>(arm.robot);
-  EXPECT_EQ(arm.device->probe(request(q, c)).status, static_cast<std::uint16_t>(StepStatus::no_set));
+  const wire::ProbeResponse without = arm.device->probe(request(q, c));
+  EXPECT_EQ(without.status, static_cast<std::uint16_t>(StepStatus::no_set));
+  EXPECT_EQ(without.flags, step_flag::no_set);
   ASSERT_EQ(arm.push(make_image(arm.robot, 1)), Answer::accepted);
   wire::ProbeRequest r = request(q, c);
   r.q_rad[2] = 0x7FF8000000000001ULL;
   const wire::ProbeResponse out = arm.device->probe(r);
   EXPECT_EQ(out.status, static_cast<std::uint16_t>(StepStatus::refused));
+  EXPECT_EQ(out.flags, step_flag::refused);
   EXPECT_EQ(out.q_rad, r.q_rad);
   EXPECT_EQ(out.position_m, 0U);
   r = request(q, c);

@@ -122,6 +122,25 @@ TEST_F(ModbusPdu, PushPullAndProbe) {
   for (std::size_t j = 0; j < joints; ++j) EXPECT_EQ(answer.q_rad[j], to_binary64_bits(expected.q[j]));
   EXPECT_EQ(answer.sequence, 5U);
   EXPECT_EQ(client.ask(join({{6}, be({map::probe_trigger, 3})})), exception(6, 4));
+
+  // The flags follow the response: a client that reads it alone gets what it always got.
+  EXPECT_EQ(client.read(map::probe_flags, 1), Bytes({3, 2, 0, 0})) << "nothing holds it back";
+  request.q_rad[4] = to_binary64_bits(Scalar(0));  // the wrist is straight
+  wire::encode(request, wire::ByteOrder::big, record.data());
+  const auto ask = [&](unsigned registers) {
+    return client.ask(join({{0x17},
+                            be({map::probe_response, registers, map::probe_request, 109}),
+                            {218},
+                            record,
+                            be({map::trigger_default_context})}));
+  };
+  const Bytes longer = ask(map::probe_response_registers + 1);
+  ASSERT_EQ(longer.size(), 2 + wire::probe_response_bytes + 2);
+  EXPECT_EQ(Bytes(longer.end() - 2, longer.end()), Bytes({0, step_flag::near_singular}));
+  const Bytes shorter = ask(map::probe_response_registers);
+  EXPECT_EQ(Bytes(shorter.begin() + 2, shorter.end()), Bytes(longer.begin() + 2, longer.end() - 2));
+  EXPECT_EQ(ask(map::probe_response_registers + 2), exception(0x17, 2));
+  EXPECT_EQ(client.write(map::probe_flags, be({0})), exception(16, 2));
 }
 
 TEST_F(ModbusPdu, RefusesWithTheReasonInTheStatus) {

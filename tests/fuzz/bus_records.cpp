@@ -80,9 +80,9 @@ class Foreign final : public ControllerClient {
     disturb(last_image_);
     return last_image_;
   }
-  flexcomp::host::Bytes exchange_probe(std::span<const std::uint8_t> request) override {
+  flexcomp::host::Bytes exchange_probe(std::span<const std::uint8_t> request, bool with_flags) override {
     require(request.size() == wire::probe_request_bytes, "a probe of another length");
-    flexcomp::host::Bytes bytes(wire::probe_response_bytes);
+    flexcomp::host::Bytes bytes(wire::probe_response_bytes + (with_flags ? 2U : 0U));
     disturb(bytes);
     return bytes;
   }

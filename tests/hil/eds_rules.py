@@ -285,7 +285,7 @@ def spoiled(data):
     text = data.decode()
     change = lambda old, new: (f"{old!r} -> {new!r}", re.sub(old, new, text, count=1, flags=re.M).encode())
     yield from (change(old, new) for old, new in (
-        (r"\r\n", "\n"), (r"flexcomp", "fl\u00e9xcomp"), (r"^FileVersion=.*\r\n", ""), (r"^FileRevision=1", "FileRevision=256"),
+        (r"\r\n", "\n"), (r"flexcomp", "fl\u00e9xcomp"), (r"^FileVersion=.*\r\n", ""), (r"^FileRevision=\d+", "FileRevision=256"),
         (r"^CreationDate=\S+", "CreationDate=2026-11-22"), (r"^CreationDate=\d\d", "CreationDate=13"),
         (r"^ModificationDate=\S+", "ModificationDate=01-01-2020"), (r"^CreationTime=\S+", "CreationTime=15:00"),
         (r"^EDSVersion=4.0", "EDSVersion=5.0"), (r"^NrOfTXPDO=1", "NrOfTXPDO=0"), (r"^NrOfRXPDO=0", "NrOfRXPDO=1"),

@@ -99,6 +99,7 @@ class Exchange {
     encode(probe_request(1), flexcomp::wire::ByteOrder::little, probe);
     download(co::probe, co::probe_request, probe, sizeof probe);
     upload(co::probe, co::probe_response);
+    upload(co::probe, co::probe_flags);
     upload(0x2345, 0);  // no such object
     const std::uint8_t block[8] = {0xC2, 0x10, 0x20, 1, 0, 0, 0, 0};
     flexcomp_can_receive(can_, static_cast<std::uint16_t>(co::sdo_request_id + node), block, sizeof block);
@@ -293,7 +294,7 @@ class Exchange {
     for (std::size_t k = 0; k < selftest::command_count; ++k) {
       std::uint8_t pdu[10 + flexcomp::wire::probe_request_bytes + 2] = {0x17};
       put16(pdu + 1, map::probe_response);
-      put16(pdu + 3, map::probe_response_registers);
+      put16(pdu + 3, map::probe_response_registers + 1);  // with the flags
       put16(pdu + 5, map::probe_request);
       put16(pdu + 7, map::probe_request_registers + 1);
       pdu[9] = flexcomp::wire::probe_request_bytes + 2;

@@ -54,6 +54,7 @@ class ModbusServer {
   std::uint32_t staging_offset_ = 0;
   std::uint32_t reading_offset_ = 0;
   std::uint16_t trigger_ = 0;
+  std::uint16_t probe_flags_ = 0;
   std::array<std::uint8_t, wire::probe_request_bytes> probe_request_{};
   std::array<std::uint8_t, wire::probe_response_bytes> probe_response_{};
 };

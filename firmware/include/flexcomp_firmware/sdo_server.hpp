@@ -22,7 +22,8 @@ struct ClientObjects {
   std::uint32_t argument = 0;                                           ///< of the next command
   std::uint16_t command = 0;                                            ///< the last one
   std::array<std::uint8_t, wire::probe_request_bytes> probe_request{};  ///< record
-  bool is_asked = false;                                                ///< whether it has been written
+  std::uint16_t probe_flags = 0;  ///< of the response that was read last
+  bool is_asked = false;          ///< whether it has been written
 };
 
 /// COB-IDs of a server; bit 31 (wire::canopen::not_valid) in either: there is none.

@@ -126,6 +126,7 @@ constexpr Object objects[] = {
     {probe, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {probe, probe_request, Type::domain, Access::rw, probe_request_bytes, "Probe request record"},
     {probe, probe_response, Type::domain, Access::ro, probe_response_bytes, "Probe response record"},
+    {probe, probe_flags, Type::u16, Access::ro, 2, "Flags of the probe response that was read last"},
     {corrections, 0, Type::u8, Access::constant, 1, "Highest sub-index"},
     {corrections, 1, Type::real32, Access::ro, 4, "Correction of joint 1 in the last cycle, deg"},
     {corrections, 2, Type::real32, Access::ro, 4, "Correction of joint 2 in the last cycle, deg"},

@@ -63,9 +63,10 @@
 ///     0x2011   0  UNSIGNED8       const   2
 ///              1  UNSIGNED32      rw      argument of the next command
 ///              2  UNSIGNED16      rw      command (wire::Command): writing it runs it; reads the last one
-///     0x2020   0  UNSIGNED8       const   2
+///     0x2020   0  UNSIGNED8       const   3
 ///              1  DOMAIN          rw      probe request record
 ///              2  DOMAIN          ro      probe response record, by the set that is active when it is read
+///              3  UNSIGNED16      ro      flags of that response (flexcomp::step_flag)
 ///     0x2021   0  UNSIGNED8       const   7: corrections
 ///            1-6  REAL32          ro      correction of joint 1 … 6 in the last control cycle, deg
 ///              7  REAL32          ro      largest correction of any joint since the start, deg
@@ -138,6 +139,7 @@ constexpr std::uint8_t command_number = 2;        ///< sub-index: command
 constexpr std::uint16_t probe = 0x2020;           ///< probe request and response
 constexpr std::uint8_t probe_request = 1;         ///< sub-index: request record
 constexpr std::uint8_t probe_response = 2;        ///< sub-index: response record
+constexpr std::uint8_t probe_flags = 3;           ///< sub-index: flags of the response that was read last
 constexpr std::uint16_t corrections = 0x2021;     ///< of the last control cycle
 
 constexpr std::uint32_t save_signature = 0x65766173;  ///< "save", CiA 301 7.5.2.13

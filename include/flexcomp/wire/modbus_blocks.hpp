@@ -30,6 +30,7 @@ enum class Block : std::uint8_t {
   probe_request,   ///< probe request record
   probe_trigger,   ///< answers the request
   probe_response,  ///< probe response record
+  probe_flags,     ///< of that response
   corrections,     ///< of the last control cycle, binary32
   robot,           ///< robot record
   certificate,     ///< certificate record
@@ -69,6 +70,8 @@ constexpr BlockDescription block_descriptions[] = {
      "1 answers the request, 2 its joint command with the robot's default context"},
     {Block::probe_response, probe_response, probe_response_registers, true, false, "probe_response",
      "the corrected command"},
+    {Block::probe_flags, probe_flags, 1, true, false, "probe_flags",
+     "all that holds of the probe response, as bits"},
     {Block::corrections, corrections, corrections_registers, true, false, "people",
      "corrections of the last control cycle, and the largest since the start"},
     {Block::robot, robot, robot_registers, true, false, "robot", "the nominal robot"},

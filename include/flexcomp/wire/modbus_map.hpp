@@ -16,6 +16,7 @@
 ///     0x036C         1    rw      probe trigger: writing 1 answers the request, 2 answers its joint command
 ///                                 with the robot's default context
 ///     0x0380        36    r       probe response record
+///     0x03A4         1    r       flags of that response (flexcomp::step_flag)
 ///     0x0400        14    r       corrections, binary32 "ABCD": correction of joints 1 … 6 in the
 ///                                 last control cycle, then the largest of any joint since the start (deg)
 ///     0x0500       288    r       robot record (robot_record.hpp)
@@ -32,7 +33,7 @@
 /// - Reading beyond the active image is exception 02. One request of function 23 writes the offset and reads
 ///   up to 123 registers. The set may change between two requests: compare the status before and after.
 /// - Argument and command in one request of function 16 (three registers from 0x00A0) run the command.
-/// - One request of function 23 writes probe request and trigger (109 registers) and reads the response.
+/// - One request of function 23 writes probe request and trigger (109 registers) and reads the response, with its flags (37) or without (36).
 /// - An application refuses with exception 04, or 06 where it is busy; `answer`, `refusal` and `detail` in
 ///   the status record say why. Two TCP connections have each their own offsets, argument and probe.
 /// - TCP: units 0, 255 and the configured one are this device, other units get no answer. RTU: unit 0 is
@@ -68,6 +69,7 @@ constexpr std::uint16_t probe_request_registers = probe_request_bytes / 2;  ///<
 constexpr std::uint16_t probe_trigger = 0x036C;   ///< trigger_request or trigger_default_context
 constexpr std::uint16_t probe_response = 0x0380;  ///< probe response record, read only
 constexpr std::uint16_t probe_response_registers = probe_response_bytes / 2;  ///< its length
+constexpr std::uint16_t probe_flags = 0x03A4;        ///< of the probe response, read only
 constexpr std::uint16_t corrections = 0x0400;        ///< corrections of the last control cycle, read only
 constexpr std::uint16_t corrections_registers = 14;  ///< its length
 

@@ -40,7 +40,8 @@
 ///     168 f64 x 6 relative speed of joint
 ///
 /// Where the probe's status is `no_set` or `refused` the command comes back unchanged and both residuals are
-/// 0.
+/// 0. All that holds of an answer, as bits (flexcomp::step_flag), is a u16 of its own beside the response: Modbus register
+/// 0x03A4, CANopen object 0x2020:3, where the capability has capability_flag::probe_flags.
 ///
 /// A refusal by admission (Refusal::too_large and after) has in its detail the index of the term among those that are not
 /// constant, from 0, in the order of the image; Refusal::too_costly the number of instructions.
@@ -133,6 +134,7 @@ constexpr std::uint16_t trial_reverted = 8;  ///< a set on trial was not confirm
 namespace capability_flag {
 constexpr std::uint32_t unit =
     1;  ///< there is a unit record, and rollback and restore_defaults are not for everybody
+constexpr std::uint32_t probe_flags = 2;  ///< the flags of a probe's answer can be read
 }  // namespace capability_flag
 
 /// Slot of a set that is in none.
@@ -204,6 +206,7 @@ struct ProbeResponse {
   std::uint16_t status = 0;                   ///< StepStatus
   std::uint16_t slot = no_slot;               ///< of the set that answered, or no_slot
   std::uint32_t sequence = 0;                 ///< of that set, 0: none
+  std::uint16_t flags = 0;                    ///< bits of step_flag; beside the record, not in it
 };
 constexpr std::size_t probe_response_bytes = 72;  ///< size of the probe response record
 

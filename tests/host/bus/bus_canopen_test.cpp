@@ -420,6 +420,11 @@ struct CanopenDevice : fake::Controller {
       if (o.index == co::robot && tells_robot) return out = robot_record(little), 0;
       if (o.index == co::image && o.sub == co::image_active) return out = active, 0;
       if (o.index == co::probe && o.sub == co::probe_response) return out = answer_bytes, 0;
+      if (o.index == co::probe && o.sub == co::probe_flags && tells_flags()) {
+        out.resize(2);
+        store_u16(out.data(), probe({}).flags);
+        return 0;
+      }
       return co::abort::no_object;
     };
     server.wrote = [this](ObjectAddress o, const Bytes& in) -> std::uint32_t {
@@ -731,6 +736,9 @@ TEST(CanopenClient, ProbesWithAllBits) {
   Bus bus(std::ref(device.server));
   const auto client = client_on(bus);
   fake::expect_exact_probe(*client);
+  device.capability.flags |= wire::capability_flag::probe_flags;
+  Bus other(std::ref(device.server));
+  fake::expect_exact_probe(*client_on(other), true);
 }
 
 TEST(CanopenClient, SaysWhoDidNotAnswer) {

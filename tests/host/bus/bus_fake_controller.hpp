@@ -84,6 +84,7 @@ struct Controller {
     for (std::size_t k = 0; k < std::min<std::size_t>(keys.size(), 4); ++k)
       unit.key_ids[k] = host::id_of(keys[k]);
   }
+  bool tells_flags() const { return (capability.flags & wire::capability_flag::probe_flags) != 0; }
   bool has_unit() const { return (capability.flags & wire::capability_flag::unit) != 0; }
 
   /// Whether what is staged is for this unit and from whom it trusts.
@@ -224,6 +225,7 @@ struct Controller {
     out.position_m = request.payload_kg;
     out.orientation_rad = request.relative_speed[5];
     out.status = 1;
+    out.flags = step_flag::near_singular | step_flag::not_converged;
     out.sequence = status.active_sequence;
     return out;
   }
@@ -269,8 +271,8 @@ inline host::ClientOptions quick() {
           .staging_timeout = std::chrono::milliseconds(600)};
 }
 
-/// A probe of the controller above comes back with every bit.
-inline void expect_exact_probe(host::ControllerClient& client) {
+/// A probe of the controller above comes back with every bit, its flags where the controller tells them, else that of the status.
+inline void expect_exact_probe(host::ControllerClient& client, bool tells_flags = false) {
   wire::ProbeRequest request;
   for (std::size_t j = 0; j < 6; ++j) request.q_rad[j] = bits_of(0.1 * static_cast<double>(j) + 1e-17);
   request.payload_kg = bits_of(1.0 / 3);
@@ -280,6 +282,8 @@ inline void expect_exact_probe(host::ControllerClient& client) {
   EXPECT_EQ(response.position_m, bits_of(1.0 / 3));
   EXPECT_EQ(response.orientation_rad, bits_of(-0.7));
   EXPECT_EQ(response.status, 1);
+  EXPECT_EQ(response.flags,
+            tells_flags ? step_flag::near_singular | step_flag::not_converged : step_flag::near_singular);
 }
 
 }  // namespace flexcomp::fake

@@ -172,8 +172,10 @@ class ModbusServer {
       wire::ProbeRequest request;
       wire::decode(get(map::probe_request, wire::probe_request_bytes).data(), big, request);
       Bytes response(wire::probe_response_bytes);
-      wire::encode(device.probe(request), big, response.data());
+      const wire::ProbeResponse answer = device.probe(request);
+      wire::encode(answer, big, response.data());
       put(map::probe_response, response);
+      if (device.tells_flags()) at(map::probe_flags)[0] = answer.flags;
     }
     put(map::capability, device.capability_record(big));
     if (count == 0 && address == map::status) put(map::status, device.status_record(big));

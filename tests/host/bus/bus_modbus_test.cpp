@@ -116,6 +116,11 @@ TEST_P(ModbusClient, ProbesWithAllBitsAndTellsTheRobot) {
   EXPECT_FALSE(client->robot().has_value());
 }
 
+TEST_P(ModbusClient, ReadsTheFlagsOfAProbeWhereTheControllerTellsThem) {
+  server.device.capability.flags |= wire::capability_flag::probe_flags;
+  fake::expect_exact_probe(*server.client(), true);
+}
+
 TEST_P(ModbusClient, WaitsForABusyControllerButNotForEver) {
   server.device.busy = 3;
   const auto client = server.client();

@@ -64,6 +64,14 @@ expect 3 "far.csv:3: x_mm … qz: expected a pose that the nominal arm reaches" 
 awk -F, -v OFS=, 'NR == 2 { $5 = 150 } { print }' exact.csv >beyond.csv
 expect 0 "9 of them ok" compensate --robot "$robot" --calibration "$truth" --targets beyond.csv -o c4.csv
 sed -n 2p c4.csv | grep -q 'refused$' || fail "$(sed -n 2p c4.csv)"
+# The column has all that hold: joint 1 at its limit and the wrist straight, the wrist alone, and both words of a program's target.
+{
+  echo q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg
+  for q1 in -180 180 0; do echo "$q1,20,60,0,0,10"; done
+} >held.csv
+expect 0 "0 of them ok" compensate --robot "$robot" --calibration "$truth" --targets held.csv -o c5.csv --json held.json
+[ "$(cut -d, -f9 c5.csv | sort -u | tr '\n' ' ')" = "at_limit+near_singular near_singular status " ] || fail "$(cat c5.csv)"
+grep -q '"at_limit": 1' held.json || fail "the counts are by summary: $(cat held.json)"
 expect 3 "beyond.csv:2: q5_deg: expected a reading within the limits of joint 5" predict --robot "$robot" \
   --joints beyond.csv -o p.csv
 
