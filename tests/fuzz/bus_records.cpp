@@ -4,6 +4,7 @@
 // are those of libmodbus and of SdoClient (tests/host/bus/, tests/hil/disturbed_can_test.cpp).
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 #include "host_text.hpp"
 #include "model/parameter_image.hpp"
 
@@ -45,6 +46,7 @@ class Foreign final : public ControllerClient {
       c.terms = c.tables = 4096;
       c.values = 4096;
       c.image_bytes = 4096;
+      c.flags = input_.u8() & 1U;
       c.nominal_hash = flexcomp::nominal_hash(tx60l().nominal);
       c.name_hash = tx60l().nominal.name_hash;
       wire::encode(c, order_, bytes.data());
@@ -59,6 +61,15 @@ class Foreign final : public ControllerClient {
       s.active_crc = active.crc;
       s.active_bytes = active.bytes;
       wire::encode(s, order_, bytes.data());
+    } else if (record == Record::unit) {
+      const std::string serial = "arm 5";
+      wire::UnitRecord u;
+      u.unit_hash = flexcomp::name_hash(serial.data(), serial.size());
+      u.counter = input_.u8();
+      u.keys = input_.u8() % 6;
+      u.serial_size = static_cast<std::uint16_t>(serial.size());
+      std::copy(serial.begin(), serial.end(), u.serial.begin());
+      wire::encode(u, order_, bytes.data());
     } else {
       wire::encode(tx60l().nominal, tx60l().name.c_str(), tx60l().name.size(), order_, bytes.data());
     }
@@ -127,7 +138,7 @@ bool answers(const Ask& ask) {
 }
 
 void operate(Foreign& client, unsigned operation) {
-  switch (operation % 8) {
+  switch (operation % 12) {
     case 0:
       answers([&] { client.status(); });
       break;
@@ -151,7 +162,7 @@ void operate(Foreign& client, unsigned operation) {
     case 4: {
       const std::vector<std::uint8_t> image = image_with(8);
       PushOptions options;
-      if (operation % 8 == 4) options.trial_cycles = 10;
+      if (operation % 12 == 4) options.trial_cycles = 10;
       if (answers([&] { push_image(client, image, options); }))
         require(client.last_image() == image, "a push is active of which other bytes were read back");
       break;
@@ -161,6 +172,22 @@ void operate(Foreign& client, unsigned operation) {
       break;
     case 6:
       answers([&] { roll_back(client); });
+      break;
+    case 7:
+      answers([&] { client.unit(); });
+      break;
+    case 8:
+      answers([&] { refuse_other_unit(client, client.unit(), "image", {}, ""); });
+      answers([&] {
+        refuse_other_unit(client, client.unit(), "image", flexcomp::name_hash("arm 6", 5), "arm 6");
+      });
+      break;
+    case 9:
+      answers([&] { erase(client); });
+      break;
+    case 10:
+      answers([&] { read_back(client, image_with(8)); });
+      answers([&] { robot_of(client, ""); });
       break;
     default:
       answers([&] { client.probe({}); });
@@ -178,7 +205,7 @@ void run(Input input) {
 
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
-  for (unsigned operation = 0; operation < 8; ++operation) {
+  for (unsigned operation = 0; operation < 12; ++operation) {
     // All is right; and one byte of the first record is not.
     all.push_back(Output().u8(operation & 1U).u8(0).u8(0).u8(operation).add(Bytes(40, 0)).out);
     all.push_back(Output()

@@ -81,6 +81,12 @@ inline std::string file_of(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+inline const flexcomp::host::Robot& irb120() {
+  static const flexcomp::host::Robot robot =
+      flexcomp::host::parse_robot(file_of("host/robots/abb-irb120.yaml"), "abb-irb120.yaml");
+  return robot;
+}
+
 inline const flexcomp::host::Robot& tx60l() {
   static const flexcomp::host::Robot robot =
       flexcomp::host::parse_robot(file_of("host/robots/tx60l.yaml"), "tx60l.yaml");
