@@ -84,10 +84,13 @@ void run(Input input) {
     }
   }
   if ((which & 16U) != 0) {
-    static const Calibration whole =
-        load_calibration(path_of(file_of("tests/data/tx60l_table1.yaml"), 1), tx60l());
-    calibration = whole;
+    static const std::string paper = [] {
+      std::string text_of_paper = file_of("tests/data/tx60l_table1.yaml");
+      const std::size_t at = text_of_paper.find("robot:");
+      return text_of_paper.erase(at, text_of_paper.find('\n', at) + 1 - at);
+    }();
     reads([&] {
+      calibration = load_calibration(path_of(paper, 1), arm.robot);
       const LeftOut out = left_out_by_rigid(calibration, arm.robot, 2);
       require(out.largest_m >= 0 && out.largest_rad >= 0 && !out.effects.empty(),
               "effects that have no size");
