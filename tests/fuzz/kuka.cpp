@@ -64,24 +64,24 @@ std::vector<Bytes> seeds() {
                            ",V 2}\n$AXIS_HOME[1]=" + axes + "\nDECL FRAME F=G:" + pose + "\n$TOOL=" + pose +
                            "\n";
   std::vector<Bytes> all{
-      program_seed(0, many), program_seed(1, "PTP " + axes + "\n"), program_seed(1, "LIN " + pose + "\n"),
-      program_seed(1, "DECL E6POS XP7={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 35,E1 0,E2 0}\nLIN XP7\n"),
+      ticket_seed(0, many), ticket_seed(1, "PTP " + axes + "\n"), ticket_seed(1, "LIN " + pose + "\n"),
+      ticket_seed(1, "DECL E6POS XP7={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 35,E1 0,E2 0}\nLIN XP7\n"),
       // Turns that the corrected joints change, in each spelling.
-      program_seed(1, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 'B100011'}\nLIN XP1\n"),
-      program_seed(1, "XP1={X 500,Y 0,Z 600,A 10,B 80,C 5,S 2,T 'H23'}\nLIN XP1\n"),
-      program_seed(1,
-                   "XP1={X 500,Y 0.01,Z 600,A 0,B 90,C 0,T 0}\nLIN XP1\nXP2={X 500,Y -0.01,Z 600,A 0,B "
-                   "90,C 0,T 1}\nLIN XP2\n"),
-      program_seed(0, left), program_seed(0, "LIN_REL {X 5}\nLIN P1:" + pose + "\n"), program_seed(0, ".dat"),
-      program_seed(0, "a.src"), program_seed(0, "a.mod"), program_seed(0, "a.dtx"),
-      program_seed(0, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 'B1000110000000'}\n"),
-      program_seed(0, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 4096}\n"),
-      program_seed(0,
-                   "BAS(#TOOL,1)\nBAS(#BASE,2)\nPDAT_ACT={TOOL_NO 1,BASE_NO 2}\nFDAT_ACT={TOOL_NO 3,BASE_NO "
-                   "1,IPO_FRAME #BASE}\n$TOOL=tool_data[2]\n$BASE=base_data[1]\nPTP " +
-                       axes + "\n"),
-      program_seed(0, "LIN_REL P1\nXP1=" + pose + "\nLIN XP1:XP1\nLIN_REL XP1\nPTP " + axes + "\n"),
-      program_seed(0, "X=" + std::string(70, '{') + "\n")};
+      ticket_seed(1, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 'B100011'}\nLIN XP1\n"),
+      ticket_seed(1, "XP1={X 500,Y 0,Z 600,A 10,B 80,C 5,S 2,T 'H23'}\nLIN XP1\n"),
+      ticket_seed(1,
+                  "XP1={X 500,Y 0.01,Z 600,A 0,B 90,C 0,T 0}\nLIN XP1\nXP2={X 500,Y -0.01,Z 600,A 0,B "
+                  "90,C 0,T 1}\nLIN XP2\n"),
+      ticket_seed(0, left), ticket_seed(0, "LIN_REL {X 5}\nLIN P1:" + pose + "\n"), ticket_seed(0, ".dat"),
+      ticket_seed(0, "a.src"), ticket_seed(0, "a.mod"), ticket_seed(0, "a.dtx"),
+      ticket_seed(0, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 'B1000110000000'}\n"),
+      ticket_seed(0, "XP1={X 500,Y 50,Z 600,A 10,B 80,C 5,S 2,T 4096}\n"),
+      ticket_seed(0,
+                  "BAS(#TOOL,1)\nBAS(#BASE,2)\nPDAT_ACT={TOOL_NO 1,BASE_NO 2}\nFDAT_ACT={TOOL_NO 3,BASE_NO "
+                  "1,IPO_FRAME #BASE}\n$TOOL=tool_data[2]\n$BASE=base_data[1]\nPTP " +
+                      axes + "\n"),
+      ticket_seed(0, "LIN_REL P1\nXP1=" + pose + "\nLIN XP1:XP1\nLIN_REL XP1\nPTP " + axes + "\n"),
+      ticket_seed(0, "X=" + std::string(70, '{') + "\n")};
   // Postures whose turns a correction changes, in each spelling of them: few, as the ways to a pose take their time.
   for (std::size_t k = 0; k < 9; ++k) {
     const unsigned what = k % 3 == 0 ? 17 : k % 3 == 1 ? 19 : 29;
@@ -93,7 +93,7 @@ std::vector<Bytes> seeds() {
     const std::string t = k % 3 == 0   ? fmt::format("{}", turn)
                           : k % 3 == 1 ? fmt::format("'B{:06b}'", turn)
                                        : fmt::format("'H{:02X}'", turn);
-    all.push_back(program_seed(
+    all.push_back(ticket_seed(
         what, fmt::format("XP1={{X {:.6f},Y {:.6f},Z {:.6f},A {:.6f},B {:.6f},C {:.6f},S 2,T {}}}\nLIN XP1\n",
                           at.position.x() * 1e3, at.position.y() * 1e3, at.position.z() * 1e3,
                           degrees(abc.z()), degrees(abc.y()), degrees(abc.x()), t)));

@@ -5,7 +5,6 @@
 
 #include "exchange/arm_sides.hpp"
 #include "exchange/target_program.hpp"
-#include "flexcomp/crc32.hpp"
 #include "flexcomp/forward.hpp"
 #include "host_text.hpp"
 
@@ -33,16 +32,9 @@ inline constexpr std::array<double, flexcomp::host::joint_count> postures[] = {
     {0.0004, 0.3, 0.2, -0.0004, 0.5, 1.5704},
     {-0.0004, 0.3, 0.2, 1.5704, -0.6, -1.5712}};
 
-inline unsigned ticket(const std::string& text) {
-  return flexcomp::crc32(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()) & 0xFFU;
-}
-inline Bytes program_seed(unsigned what, const std::string& text) {
-  return with_options({what, ticket(text)}, text);
-}
-
 /// Read; written with its own targets and read again; made commands of and written with them. The first byte: bit 0 commands too,
 /// 1 of an IRB 120, 2 without joints to begin with, 3 in another frame, 4 with joints that are corrected. The second byte is that of
-/// ticket() where there are poses: the ways to one take a hundred times as long as reading, and one text in 256 has them.
+/// ticket() where there are poses: the ways to one take a hundred times as long as reading.
 inline void play_program(Input input, flexcomp::host::ProgramLanguage language) {
   using namespace flexcomp::host;
   const unsigned what = input.u8();
