@@ -15,6 +15,8 @@ namespace flexcomp::host {
 namespace {
 
 constexpr double standard_gravity_m_s2 = 9.81;
+/// A robot file, in millimetres, holds no longer length.
+constexpr double largest_m = 1e300;
 
 /// To 1e-4 m/s^2, or a hundred-thousandth of a radian: a base that is level but for rounding is level. The weight of
 /// the links is modelled only there.
@@ -25,13 +27,13 @@ std::array<double, 3> gravity(const Eigen::Vector3d& down) {
   return out;
 }
 
-/// \throws InputError  a number that is not finite: the file's are, but not what follows from them
+/// \throws InputError  a number that no robot file holds: those of the source are finite, but not what follows from them
 void put_links(const LinkChain& links, const std::string& path, ImportedArm& arm) {
   std::vector<double> all{links.tool_xyz_m.begin(), links.tool_xyz_m.end()};
   all.insert(all.end(), links.tool_wxyz.begin(), links.tool_wxyz.end());
   for (const NominalLink& l : links.links)
     all.insert(all.end(), {l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad});
-  if (!std::all_of(all.begin(), all.end(), [](double v) { return std::isfinite(v); }) ||
+  if (!std::all_of(all.begin(), all.end(), [](double v) { return std::abs(v) < largest_m; }) ||
       !links.base_to_f0.position.allFinite() || !links.base_to_f0.rotation.allFinite()) {
     throw InputError(path, 0, "", "an arm whose axes lie at finite places",
                      "lengths whose sums and products are beyond the range of numbers");
