@@ -2,9 +2,12 @@
 #include "exchange/imported_arm.hpp"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "exchange/axis_chain.hpp"
+#include "input_error.hpp"
 #include "units.hpp"
 
 namespace flexcomp::host {
@@ -12,6 +15,8 @@ namespace flexcomp::host {
 namespace {
 
 constexpr double standard_gravity_m_s2 = 9.81;
+/// A robot file, in millimetres, holds no longer length.
+constexpr double largest_m = 1e300;
 
 /// To 1e-4 m/s^2, or a hundred-thousandth of a radian: a base that is level but for rounding is level. The weight of
 /// the links is modelled only there.
@@ -22,7 +27,17 @@ std::array<double, 3> gravity(const Eigen::Vector3d& down) {
   return out;
 }
 
-void put_links(const LinkChain& links, ImportedArm& arm) {
+/// \throws InputError  a number that no robot file holds: those of the source are finite, but not what follows from them
+void put_links(const LinkChain& links, const std::string& path, ImportedArm& arm) {
+  std::vector<double> all{links.tool_xyz_m.begin(), links.tool_xyz_m.end()};
+  all.insert(all.end(), links.tool_wxyz.begin(), links.tool_wxyz.end());
+  for (const NominalLink& l : links.links)
+    all.insert(all.end(), {l.theta_rad, l.d_m, l.a_m, l.alpha_rad, l.beta_rad});
+  if (!std::all_of(all.begin(), all.end(), [](double v) { return std::abs(v) < largest_m; }) ||
+      !links.base_to_f0.position.allFinite() || !links.base_to_f0.rotation.allFinite()) {
+    throw InputError(path, 0, "", "an arm whose axes lie at finite places",
+                     "lengths whose sums and products are beyond the range of numbers");
+  }
   arm.robot.nominal.links = links.links;
   arm.robot.nominal.tool_xyz_m = links.tool_xyz_m;
   arm.robot.nominal.tool_wxyz = links.tool_wxyz;
@@ -35,7 +50,7 @@ void put_links(const LinkChain& links, ImportedArm& arm) {
 ImportedArm import_urdf(const std::string& path, const UrdfLinks& links) {
   const UrdfArm from = load_urdf(path, links);
   ImportedArm arm;
-  put_links(links_of(axes_of(from)), arm);
+  put_links(links_of(axes_of(from)), path, arm);
   arm.robot.path = path;
   arm.robot.name = from.name;
   for (std::size_t i = 0; i < joint_count; ++i) {
@@ -57,7 +72,7 @@ ImportedArm import_robot(const std::string& path) {
   ImportedArm arm;
   arm.robot = load_robot(path, LongLinks::taken);
   const auto before = link_frames(arm.robot.nominal);
-  put_links(links_of(axes_of(arm.robot.nominal)), arm);
+  put_links(links_of(axes_of(arm.robot.nominal)), path, arm);
   const auto after = link_frames(arm.robot.nominal);
   const auto carried = [&](std::size_t frame, const Eigen::Vector3d& p) -> Eigen::Vector3d {
     return after[frame].rotation.transpose() *

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <optional>
@@ -108,7 +109,8 @@ class UrdfTree {
   Eigen::Vector3d axis(const UrdfJointNode& joint) const {
     if (joint.element->child("axis") == nullptr) return Eigen::Vector3d::UnitX();
     const Eigen::Vector3d axis = triple(joint, "axis", "xyz").value_or(Eigen::Vector3d::Zero());
-    if (axis.norm() > 1e-6) return axis.normalized();
+    // Of numbers whose squares are beyond the range normalized() makes 0.
+    if (axis.norm() > 1e-6) return std::isfinite(axis.norm()) ? axis.normalized() : axis.stableNormalized();
     throw error(joint, "an axis with a direction", fmt::format("{} {} {}", axis.x(), axis.y(), axis.z()));
   }
 

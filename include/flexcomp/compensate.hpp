@@ -66,13 +66,17 @@ FLEXCOMP_ONCE bool compensate_by(Correction<S, N, Cap>& correction, const Model<
   // Checked here because a grid is constant outside its nodes, where a NaN would not show.
   if (!is_finite_context(context)) return false;
   correction.run(q);
-  // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes.
+  // Effects that grow beyond all bounds show as a NaN, an infinity or a turn that no arm makes; where they overflow on the way,
+  // only in what they leave.
   S square = S(0);
   for (std::size_t i = 0; i < N; ++i) {
     const S change = q[i] - q_command[i];
     square += change * change;
   }
-  if (!(square < S(1e8))) return false;
+  constexpr S beyond_all_bounds = S(1e8);
+  if (!(square < beyond_all_bounds && correction.position_left() < beyond_all_bounds &&
+        correction.orientation_left() < beyond_all_bounds))
+    return false;
   unsigned flags = correction.is_damped() ? step_flag::near_singular : 0U;
   if (!correction.has_converged()) flags |= step_flag::not_converged;
   // What limits cut off of the joints: at most as much turn of the tool, and as much at the arm's reach of its position.

@@ -563,6 +563,37 @@ TYPED_TEST(Refused, EffectsBeyondAllBounds) {
   }
 }
 
+// A force at the end of the range bends a link without an end, and the joints that are found for it are ordinary: found by fuzzing.
+TYPED_TEST(Refused, AnOverflowThatShowsInWhatIsLeftAlone) {
+  using S = TypeParam;
+  const arms::Arm& arm = arms::all()[0];
+  const std::array<S, 6> q{S(1.1), S(0.2), S(0.3), S(0.4), S(0.5), S(0.6)};
+  const S most = std::numeric_limits<S>::max();
+  unsigned refused = 0;
+  for (const auto basis : {flexcomp::Basis::base_moment_x, flexcomp::Basis::load_moment_x}) {
+    for (std::uint8_t slot = 0; slot < 5; ++slot) {
+      for (const double coefficient : {4.67e-62, 1e-30, 1e-10}) {
+        arms::TermSet<double> set;
+        set.add(arms::on_link(2, slot), basis, coefficient, 1);
+        const auto model = arms::prepared(arm.robot, arms::as<S>(set));
+        auto context = flexcomp::default_context<S>(arm.robot);
+        for (std::size_t k = 0; k < 3; ++k) {
+          context.force_n = {};
+          context.force_n[k] = most;
+          const Compensated<S, 6> out = flexcomp::compensate(model, q, context);
+          EXPECT_TRUE(flexcomp::is_finite(out.remaining_position_m) &&
+                      flexcomp::is_finite(out.remaining_orientation_rad))
+              << int(slot) << ", " << coefficient << ", " << k;
+          if (out.status != StepStatus::refused) continue;
+          ++refused;
+          EXPECT_EQ(out.q, q);
+        }
+      }
+    }
+  }
+  EXPECT_GT(refused, 10U);
+}
+
 /// Any bits as a scalar.
 template <class S>
 S scalar_of(std::uint64_t bits) {
@@ -606,6 +637,8 @@ TYPED_TEST(Refused, AnyBitPatternIsBounded) {
       ++taken;
       ASSERT_TRUE(within_limits(model, out.q));
       ASSERT_LE(correction(out.q, q), S(0.1) + S(8) * std::numeric_limits<S>::epsilon());
+      ASSERT_TRUE(flexcomp::is_finite(out.remaining_position_m) &&
+                  flexcomp::is_finite(out.remaining_orientation_rad));
     }
     EXPECT_GT(taken, 100000 / part) << arm.name;
     EXPECT_LT(taken, 300000 / part) << arm.name;

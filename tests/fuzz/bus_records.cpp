@@ -2,10 +2,16 @@
 // What a foreign controller answers to the client of a bus, in records and refusals: whatever it says, the client ends with a
 // result or one of its own errors, and what it takes for a robot, a set or an active push is one. The frames below the records
 // are those of libmodbus and of SdoClient (tests/host/bus/, tests/hil/disturbed_can_test.cpp).
+#include <ctime>
+
 #include "bus/transfer.hpp"
 #include "flexcomp/wire/robot_record.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 #include "host_text.hpp"
 #include "model/parameter_image.hpp"
+
+/// A client that waits is not waited for: what it asks then is what the input answers at once.
+extern "C" int nanosleep(const timespec* /*requested*/, timespec* /*left*/) { return 0; }
 
 namespace fuzz::bus_records_target {
 namespace {
@@ -13,10 +19,15 @@ namespace {
 using namespace flexcomp::host;
 namespace wire = flexcomp::wire;
 
-std::vector<std::uint8_t> image_with(std::uint32_t sequence) {
-  static const Calibration calibration =
-      load_calibration(path_of(file_of("tests/data/tx60l_table1.yaml")), tx60l());
-  return make_image(calibration, tx60l(), sequence, {.allow_unnamed = true, .allow_inadmissible = true});
+/// The set of the paper with this sequence, 7 or 8.
+const std::vector<std::uint8_t>& image_with(std::uint32_t sequence) {
+  static const auto make = [](std::uint32_t number) {
+    const Calibration calibration =
+        load_calibration(path_of(file_of("tests/data/tx60l_table1.yaml")), tx60l());
+    return make_image(calibration, tx60l(), number, {.allow_unnamed = true, .allow_inadmissible = true});
+  };
+  static const std::vector<std::uint8_t> seven = make(7), eight = make(8);
+  return sequence == 7 ? seven : eight;
 }
 
 /// Answers with what the input says: each answer is a byte, what is wrong with it, then changes of the right one.
@@ -45,6 +56,7 @@ class Foreign final : public ControllerClient {
       c.terms = c.tables = 4096;
       c.values = 4096;
       c.image_bytes = 4096;
+      c.flags = input_.u8() & 1U;
       c.nominal_hash = flexcomp::nominal_hash(tx60l().nominal);
       c.name_hash = tx60l().nominal.name_hash;
       wire::encode(c, order_, bytes.data());
@@ -59,6 +71,15 @@ class Foreign final : public ControllerClient {
       s.active_crc = active.crc;
       s.active_bytes = active.bytes;
       wire::encode(s, order_, bytes.data());
+    } else if (record == Record::unit) {
+      const std::string serial = "arm 5";
+      wire::UnitRecord u;
+      u.unit_hash = flexcomp::name_hash(serial.data(), serial.size());
+      u.counter = input_.u8();
+      u.keys = input_.u8() % 6;
+      u.serial_size = static_cast<std::uint16_t>(serial.size());
+      std::copy(serial.begin(), serial.end(), u.serial.begin());
+      wire::encode(u, order_, bytes.data());
     } else {
       wire::encode(tx60l().nominal, tx60l().name.c_str(), tx60l().name.size(), order_, bytes.data());
     }
@@ -127,7 +148,7 @@ bool answers(const Ask& ask) {
 }
 
 void operate(Foreign& client, unsigned operation) {
-  switch (operation % 8) {
+  switch (operation % 12) {
     case 0:
       answers([&] { client.status(); });
       break;
@@ -149,9 +170,9 @@ void operate(Foreign& client, unsigned operation) {
       break;
     case 3:
     case 4: {
-      const std::vector<std::uint8_t> image = image_with(8);
+      const std::vector<std::uint8_t>& image = image_with(8);
       PushOptions options;
-      if (operation % 8 == 4) options.trial_cycles = 10;
+      if (operation % 12 == 4) options.trial_cycles = 10;
       if (answers([&] { push_image(client, image, options); }))
         require(client.last_image() == image, "a push is active of which other bytes were read back");
       break;
@@ -161,6 +182,22 @@ void operate(Foreign& client, unsigned operation) {
       break;
     case 6:
       answers([&] { roll_back(client); });
+      break;
+    case 7:
+      answers([&] { client.unit(); });
+      break;
+    case 8:
+      answers([&] { refuse_other_unit(client, client.unit(), "image", {}, ""); });
+      answers([&] {
+        refuse_other_unit(client, client.unit(), "image", flexcomp::name_hash("arm 6", 5), "arm 6");
+      });
+      break;
+    case 9:
+      answers([&] { erase(client); });
+      break;
+    case 10:
+      answers([&] { read_back(client, image_with(8)); });
+      answers([&] { robot_of(client, ""); });
       break;
     default:
       answers([&] { client.probe({}); });
@@ -172,13 +209,12 @@ void operate(Foreign& client, unsigned operation) {
 void run(Input input) {
   std::unique_ptr<Foreign> client;
   if (!answers([&] { client = std::make_unique<Foreign>(input); })) return;
-  // Each waits some milliseconds where the controller says that it works.
   for (int k = 0; k < 6 && !input.is_empty(); ++k) operate(*client, input.u8());
 }
 
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
-  for (unsigned operation = 0; operation < 8; ++operation) {
+  for (unsigned operation = 0; operation < 12; ++operation) {
     // All is right; and one byte of the first record is not.
     all.push_back(Output().u8(operation & 1U).u8(0).u8(0).u8(operation).add(Bytes(40, 0)).out);
     all.push_back(Output()

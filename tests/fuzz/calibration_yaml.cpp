@@ -6,6 +6,7 @@
 
 #include "files/calibration_file.hpp"
 #include "host_text.hpp"
+#include "model/effects.hpp"
 #include "model/parameter_image.hpp"
 
 namespace fuzz::calibration_yaml_target {
@@ -65,6 +66,11 @@ void run(Input input) {
   require(calibration.terms.values == again.terms.values,
           "other table values are read from what was written");
 
+  never_pushed(calibration, robot);
+  for (const Parameter& p : parameters_of(calibration.terms, robot.nominal)) {
+    for (const std::size_t t : p.terms) require(t < calibration.terms.terms.size(), "a parameter of no term");
+  }
+
   // Admitted or not; what is no image at all is refused.
   reads([&] { make_image(calibration, robot, 1); });
   std::vector<std::uint8_t> image;
@@ -103,6 +109,33 @@ std::vector<Bytes> seeds() {
     effects += "  " + entry + "\n";
   }
   all.push_back(bytes_of(effects));
+  // Each name that a grid and a curve know; refused, each for a reason of its own.
+  for (const char* of : {"q1, payload_kg", "temp_c, q2", "time_s, q3", "dir4, temp_c", "speed5, q1",
+                         "payload_kg, time_s", "q1, q1", "q7, q1", "q1"})
+    all.push_back(bytes_of(std::string("effects:\n  - {effect: unnamed, place: link3.theta, of: [") + of +
+                           "], grid: [[-1, 1], [0, 2]], values_rad: [[0, 1e-4], [1e-4, 0]]}\n"));
+  for (const char* factor : {"load_torque", "temperature", "payload", "none"})
+    all.push_back(bytes_of(std::string("effects:\n  - {effect: joint_curve, joint: 1, factor: ") + factor +
+                           ", coefficients_rad: [0, 1e-4, 0, 1e-4, 0, 0], coefficients_rad_per_nm: [0, 1e-4, "
+                           "0, 1e-4, 0, 0], coefficients_rad_per_k: [0, 1e-4, 0, 1e-4, 0, 0]}\n"));
+  for (const char* text :
+       {"geometric:\n  - {link: 1, d_mm: 1}\n  - {link: 1, a_mm: 1}\n",
+        "geometric:\n  - {link: 1, d_mm: 1000}\n",
+        "effects:\n  - {effect: backlash, joint: 2, half_gap_rad: 1e-4}\n  - {effect: backlash, joint: 2, "
+        "half_gap_rad: 1e-4}\n",
+        "effects:\n  - {effect: unnamed, place: link3.theta, of: [q2, q3], grid: [[-1, 1], [0, 2]], "
+        "values_rad: [[0, 1]]}\n",
+        "effects:\n  - {effect: unnamed, place: link3.theta, of: [q2, q3], grid: [[-1, 1], [0, 2]], "
+        "values_rad: [[0], [1]]}\n",
+        "effects:\n  - {effect: unnamed, place: link3.theta, of: [q2, q3], grid: [[1, -1], [0, 2]], "
+        "values_rad: [[0, 1], [1, 0]]}\n",
+        "effects:\n  - {effect: joint_coupling, joint: 6, gain: 1e-4}\n", "robot: another\n",
+        "effects:\n  - {effect: joint_coupling, joint: 6, from: 6, gain: 1e-4}\n",
+        "nominal_hash: 0000000000000000000000000000000000000000000000000000000000000000\n",
+        "covariance_factor:\n  - {parameter: a, row: [1]}\n  - {parameter: a, row: [1, 2]}\n",
+        "covariance_factor:\n  - {parameter: a, row: [1]}\n  - {parameter: b, row: [1]}\n",
+        "tool: {x_mm: 1, rz_deg: 0.1}\nbase: {z_mm: 1, sigma_z_mm: 0.1}\n"})
+    all.push_back(bytes_of(text));
   return all;
 }
 

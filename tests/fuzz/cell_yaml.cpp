@@ -42,7 +42,10 @@ std::vector<Bytes> seeds() {
                    "  - {column: A_1, unit: deg}\n  - {column: A_2, unit: deg, sign: -1, offset_deg: 90}\n"
                    "  - {column: A_3, unit: rad, offset_deg: -90}\n  - {column: A_4, unit: deg}\n"
                    "  - {column: A_5, unit: deg}\n  - {column: A_6, unit: deg}\n"
-                   "context: {payload_kg: Last, temp_c: Temperatur}\n")};
+                   "context: {payload_kg: Last, temp_c: Temperatur}\n"),
+      with_options({2}, "time: Zeit\ndelimiter: tab\ncontext: {payload: Last}\n"),
+      with_options({2}, "delimiter: blanks\ndecimal: x\n"),
+      with_options({2}, "delimiter: \"xy\"\n")};
 }
 
 const Register registered({"cell_yaml", run, seeds, mutate_words<yaml_words>});

@@ -24,6 +24,11 @@ namespace fuzz {
 using Bytes = std::vector<std::uint8_t>;
 
 inline Bytes bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
+/// The lowest eight bits of each number.
+template <class... Numbers>
+Bytes octets(Numbers... numbers) {
+  return {static_cast<std::uint8_t>(numbers)...};
+}
 
 /// A finding: says what does not hold and ends the program, as a sanitizer does.
 [[noreturn]] inline void finding(const std::string& what) {

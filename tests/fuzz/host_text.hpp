@@ -14,6 +14,7 @@
 
 #include "errors.hpp"
 #include "files/robot_file.hpp"
+#include "flexcomp/crc32.hpp"
 #include "fuzz.hpp"
 #include "input_error.hpp"
 
@@ -81,6 +82,12 @@ inline std::string file_of(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+inline const flexcomp::host::Robot& irb120() {
+  static const flexcomp::host::Robot robot =
+      flexcomp::host::parse_robot(file_of("host/robots/abb-irb120.yaml"), "abb-irb120.yaml");
+  return robot;
+}
+
 inline const flexcomp::host::Robot& tx60l() {
   static const flexcomp::host::Robot robot =
       flexcomp::host::parse_robot(file_of("host/robots/tx60l.yaml"), "tx60l.yaml");
@@ -92,6 +99,14 @@ inline Bytes with_options(std::initializer_list<unsigned> options, const std::st
   Output out;
   for (const unsigned o : options) out.u8(o);
   return out.add(bytes_of(text)).out;
+}
+
+/// What takes a hundred times as long as reading is done for one text in 256: that whose second byte is this one.
+inline unsigned ticket(const std::string& text) {
+  return flexcomp::crc32(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()) & 0xFFU;
+}
+inline Bytes ticket_seed(unsigned what, const std::string& text) {
+  return with_options({what, ticket(text)}, text);
 }
 
 /// Mutations with words of a format.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A parameter image through reader, admission, store and steps. Input: what is mended (bit 0 CRC-32, 1 binding, 2 length, 3 counts),
+// A parameter image through reader, admission, store and steps. Input: what is mended (bit 0 CRC-32, 1 binding, 2 length, 3 counts,
+// 4 signature),
 // what the controller is like, the number of odd steps, then the image, then the steps.
 #include "whole_device.hpp"
 
@@ -36,6 +37,7 @@ void mend(Bytes& image, unsigned what) {
     store_u16(image.data() + 82, static_cast<std::uint16_t>(tables));
     store_u32(image.data() + 84, values);
   }
+  if ((what & 16U) != 0) mend_signature(image, 0);
   if ((what & 1U) != 0) mend_crc(image);
 }
 
@@ -47,7 +49,7 @@ void run(Input input) {
   Bytes image = input.bytes(size);
   mend(image, what);
 
-  Device device(start & 0x1CU);
+  Device device(start & 0x7CU);
   const unsigned answer = device.push(image);
   const flexcomp_state after = device.state();
   if (answer != 0) {
@@ -88,6 +90,54 @@ std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
   for (unsigned k = 0; k < image_count; ++k) all.push_back(input_of(good_image(k, k + 1), 15, 4 * k));
   all.push_back(input_of(good_image(5, 1), 0, 0));
+  // Each byte of a set changed.
+  for (const unsigned number : {3U, 4U}) {
+    const Bytes good = good_image(number, 1);
+    for (std::size_t at = 80; at + 4 < good.size(); at += at < 140 ? 1 : 5) {
+      Bytes image = good;
+      image[at] = static_cast<std::uint8_t>(image[at] ^ 0x50U);
+      all.push_back(input_of(image, 5, 0));
+    }
+  }
+  // Bound to a unit, and signed.
+  for (unsigned k = 0; k < image_count; k += 2) {
+    all.push_back(input_of(good_image(k, k + 1, true), 15, 0x60));
+    all.push_back(input_of(signed_image(good_image(k, k + 1, true), 7, 0), 31, 0x20));
+    all.push_back(input_of(signed_image(good_image(k, k + 1, true), 7, 2), 15, 0x40));
+  }
+  // Curves times each factor, grids over any two covariates; small and far too large.
+  for (const double size : {1e-5, 1.0, 1e4}) {
+    for (unsigned kind = 0; kind < 40; ++kind) {
+      FirmwareTerm t;
+      t.place = {static_cast<std::uint8_t>(1 + kind % 4), static_cast<std::uint8_t>(kind % 6)};
+      t.basis = kind < 4 ? flexcomp::Basis::curve : flexcomp::Basis::grid;
+      t.factor = static_cast<flexcomp::Factor>(kind % 4);
+      t.joint = static_cast<std::uint8_t>(kind % 4);
+      t.coefficient = static_cast<FirmwareScalar>(size);
+      t.table = 0;
+      std::vector<flexcomp::Table> tables(1);
+      tables[0].size = 8;
+      if (kind >= 4) {
+        t.factor = flexcomp::Factor::one;
+        tables[0].rows = tables[0].columns = 2;
+        tables[0].row_covariate = static_cast<flexcomp::Covariate>((kind - 4) % 6);
+        tables[0].column_covariate = static_cast<flexcomp::Covariate>((kind - 4) / 6);
+      }
+      all.push_back(input_of(image_of({t}, tables, {-1, 1, -1, 1, 0, 1, 0, 0.5F}, 1), 15, 0));
+    }
+    // Each other basis at a link, of a size that is refused.
+    for (unsigned basis = 0; basis < flexcomp::basis_count; ++basis) {
+      if (basis == 15 || basis == 17) continue;
+      FirmwareTerm t;
+      t.place = {2, static_cast<std::uint8_t>(basis % 5)};
+      t.basis = static_cast<flexcomp::Basis>(basis);
+      t.joint = 1;
+      t.distal_joint = 2;
+      t.argument = FirmwareScalar(2);
+      t.coefficient = static_cast<FirmwareScalar>(size);
+      all.push_back(input_of(image_of({t, t}, {}, {}, 1), 15, 0));
+    }
+  }
   // One small image for each basis and each place, which admission may take or refuse.
   for (unsigned basis = 0; basis < flexcomp::basis_count; ++basis) {
     std::vector<FirmwareTerm> terms;

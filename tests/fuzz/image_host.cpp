@@ -3,6 +3,7 @@
 // the header but for the counts.
 #include "files/calibration_file.hpp"
 #include "flexcomp/image.hpp"
+#include "flexcomp/signature.hpp"
 #include "host_text.hpp"
 #include "model/parameter_image.hpp"
 
@@ -29,6 +30,18 @@ void run(Input input) {
     flexcomp::store_u32(image.data() + image.size() - 4, flexcomp::crc32(image.data(), image.size() - 4));
   Calibration calibration;
   if (!reads([&] { calibration = calibration_from_image(image, tx60l(), "controller"); })) return;
+  std::vector<std::uint8_t> plain;
+  must_read("(an image)", [&] {
+    const ImageRecords records = image_records(image, "controller");
+    plain = without_signature(image, "controller");
+    require(records.is_signed == (plain.size() != image.size()), "a signature that is not one");
+  });
+  Calibration same;
+  must_read("(an image without its signature)",
+            [&] { same = calibration_from_image(plain, tx60l(), "controller"); });
+  require(!image_records(plain, "controller").is_signed &&
+              same.terms.terms.size() == calibration.terms.terms.size(),
+          "an image without its signature is another one");
   // It can be shown as a file, or is refused there.
   std::string text;
   if (!reads([&] { text = calibration_text(calibration, tx60l()); })) return;
@@ -44,6 +57,10 @@ std::vector<Bytes> seeds() {
     try {
       const std::vector<std::uint8_t> image = image_of(text);
       all.push_back(Output().u8(3).add(image).out);
+      Bytes signed_one(flexcomp::signed_size(image.size()));
+      std::copy(image.begin(), image.end(), signed_one.begin());
+      flexcomp::append_signature(signed_one.data(), image.size(), 7, {1, 2, 3});
+      all.push_back(Output().u8(1).add(signed_one).out);
       if (all.size() < 3) all.push_back(Output().u8(0).add(image).out);
     } catch (const InputError&) {  // an effect of the measurement, which no image has
     }

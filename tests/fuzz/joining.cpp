@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A point list and a robot's log joined into a data file, which is read again. Four bytes of options, then both texts with a zero
+// A point list and a robot's log joined into a data file, which is read again. Six bytes of options, then both texts with a zero
 // byte between.
 #include "tables.hpp"
 
@@ -9,14 +9,15 @@ namespace {
 using namespace flexcomp::host;
 
 void run(Input input) {
-  const PointListOptions list_options = point_options(input.u8());
-  const LogMap map = log_options(input.u8());
+  const PointListOptions list_options = point_options(input.u16());
+  const LogMap map = log_options(input.u16());
   JoinOptions options;
   const unsigned how = input.u8();
   options.by = static_cast<JoinBy>(how % 3);
   const unsigned more = input.u8();
   if ((more & 1U) != 0) options.names = "{pose}_{reflector}";
   if ((more & 2U) != 0) options.names = "*::{pose}";
+  if ((more & 3U) == 3) options.names = "{pose}{reflector}";
   if ((more & 12U) != 0) options.reflectors = (more & 4U) != 0 ? 3 : 4;
   options.repeats = (more & 16U) != 0;
   if ((more & 32U) != 0) options.shift_s = 0.2;
@@ -31,7 +32,7 @@ void run(Input input) {
                 joined.point_lines.size() == joined.data.rows.size(),
             "rows without their lines");
     const std::string text = data_text(joined.data);
-    check_joined(text, "out.csv", tx60l(), points, log, joined, true);
+    check_joined(text, "out.csv", tx60l(), points, log, joined, (more & 64U) == 0);
     to_json(joined, points, log, options.by).dump();
     // Columns of the log that a data file knows stand at its end; once read they stand where they belong.
     MeasuredData again;
@@ -48,8 +49,8 @@ std::vector<Bytes> seeds() {
     for (const std::string& log : robot_logs) {
       const unsigned by = static_cast<unsigned>(all.size());
       Output out;
-      out.u8(all.size() % 4 == 0 ? 7 : 1)
-          .u8(by % 5 == 2 ? 8 : 1)
+      out.u16(all.size() % 4 == 0 ? 7 : 1)
+          .u16(by % 5 == 2 ? 8 : 1)
           .u8(by % 5 == 2   ? 2
               : by % 3 == 0 ? 1
                             : 0)
@@ -57,10 +58,59 @@ std::vector<Bytes> seeds() {
       all.push_back(out.add(bytes_of(points)).u8(0).add(bytes_of(log)).out);
     }
   }
-  all.push_back(
-      Output().u8(1).u8(1).u8(0).u8(1).add(bytes_of(point_lists[5])).u8(0).add(bytes_of(robot_logs[0])).out);
-  all.push_back(
-      Output().u8(1).u8(8).u8(2).u8(0).add(bytes_of(point_lists[2])).u8(0).add(bytes_of(robot_logs[2])).out);
+  // In each way, with each pattern of names.
+  for (const std::string& points : point_lists) {
+    for (unsigned how = 0; how < 15; ++how) {
+      const unsigned more = how / 3 + (how % 2) * 16 + (how % 5 == 0 ? 64 : 0) + (how % 4 == 1 ? 32 : 0);
+      const std::string& log = robot_logs[how == 0       ? 0
+                                          : how == 3     ? 5
+                                          : how == 6     ? 13
+                                          : how == 9     ? 16
+                                          : how % 3 == 2 ? 8 + how / 6
+                                                         : 0];
+      all.push_back(Output()
+                        .u16(1)
+                        .u16(how == 14 ? 8192 : 0)
+                        .u8(how % 3)
+                        .u8(more)
+                        .add(bytes_of(points))
+                        .u8(0)
+                        .add(bytes_of(log))
+                        .out);
+    }
+  }
+  for (unsigned by = 0; by < 3; ++by) {
+    for (const std::string& log : robot_logs) {
+      for (const unsigned list : {2U, 6U, 13U, 26U, 27U, 28U})
+        all.push_back(Output()
+                          .u16(1)
+                          .u16(0)
+                          .u8(by)
+                          .u8(64)
+                          .add(bytes_of(point_lists[list]))
+                          .u8(0)
+                          .add(bytes_of(log))
+                          .out);
+    }
+  }
+  all.push_back(Output()
+                    .u16(1)
+                    .u16(1)
+                    .u8(0)
+                    .u8(1)
+                    .add(bytes_of(point_lists[5]))
+                    .u8(0)
+                    .add(bytes_of(robot_logs[0]))
+                    .out);
+  all.push_back(Output()
+                    .u16(1)
+                    .u16(8)
+                    .u8(2)
+                    .u8(0)
+                    .add(bytes_of(point_lists[2]))
+                    .u8(0)
+                    .add(bytes_of(robot_logs[2]))
+                    .out);
   return all;
 }
 

@@ -17,7 +17,7 @@ void operate(Device& device, Input& input) {
     case frame + 1: {
       const unsigned to = unit(input.u8());
       const std::uint32_t us = input.u16();
-      device.rtu_frame(to, modbus_request(input), us);
+      device.rtu_frame(to, modbus_request(device, input), us);
       break;
     }
     case raw: {
@@ -45,7 +45,7 @@ void operate(Device& device, Input& input) {
       const unsigned at = input.u8();
       const std::uint32_t us = input.u16();
       const unsigned noise = input.u8();
-      const Bytes pdu = modbus_request(input);
+      const Bytes pdu = modbus_request(device, input);
       all.insert(all.end(), pdu.begin(), pdu.end());
       all = Output().add(all).u16(modbus_crc_of(all)).out;
       const auto cut = all.begin() + static_cast<std::ptrdiff_t>(at % all.size());
@@ -56,7 +56,7 @@ void operate(Device& device, Input& input) {
     }
     case storage: {
       const unsigned what = input.u8();
-      if (what < 96) device.fail_storage(what % 4);
+      if (what < 96) device.fail_storage(what % 4, what / 4);
       if (what >= 96 && what < 192) device.busy_storage(what % 8);
       if (what >= 192) device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
       break;
@@ -113,6 +113,27 @@ std::vector<Bytes> seeds() {
   }
   all.push_back(many.out);
   add_command_seeds(before, before, all);
+  add_signed_seeds(before, all);
+  // Bytes in bursts: what begins after a silence may be a frame, also where the memory is full.
+  const Bytes noise = Bytes(250, 17);
+  for (const unsigned us : {1800U, 100U}) {
+    Output out;
+    out.u8(130).u8(raw).u16(us).u8(3).add(octets(17, 3, 0));
+    out.u8(frame).u8(0).u16(us).add(octets(1, 0, 0, 2));
+    for (int k = 0; k < 2; ++k) out.u8(raw).u16(us).u8(250).add(noise);
+    out.u8(raw).u16(us).u8(9).add(octets(17, 16, 0, 0, 0, 100, 200, 1, 2)).u8(raw).u16(us).u8(250).add(noise);
+    out.u8(frame).u8(0).u16(us).add(octets(1, 0, 0, 2)).u8(line_poll).u16(30000);
+    all.push_back(out.out);
+  }
+  // Functions that no server of this map has, with their lengths.
+  for (const unsigned function : {0x0FU, 0x16U, 0x05U, 0x07U})
+    all.push_back(Output()
+                      .u8(0)
+                      .add(before)
+                      .add(octets(0, 9, function, 0, 1, 0, 1, 2, 0, 0, 0))
+                      .u8(line_poll)
+                      .u16(2000)
+                      .out);
   all.push_back(Output()
                     .u8(0)
                     .u8(raw)

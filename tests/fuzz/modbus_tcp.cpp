@@ -10,10 +10,10 @@ constexpr unsigned request = 0, raw = 2, portions = 3, store_poll = 4, close = 7
                    operations = 11;
 
 /// A frame around a PDU whose header may be wrong by a byte.
-Bytes frame_of(Input& input) {
+Bytes frame_of(Device& device, Input& input) {
   const unsigned wrong = input.u8();
   const unsigned byte = input.u8();
-  const Bytes pdu = modbus_request(input);
+  const Bytes pdu = modbus_request(device, input);
   const unsigned length = static_cast<unsigned>(pdu.size()) + 1;
   Bytes frame =
       Output().u16(0x0201).u16(0).u8(length >> 8U & 0xFFU).u8(length & 0xFFU).u8(unit_id).add(pdu).out;
@@ -27,7 +27,7 @@ void operate(Device& device, Input& input, std::array<bool, Device::connections>
   switch ((operation & 0x7FU) % operations) {
     case request:
     case request + 1: {
-      const Bytes pdu = modbus_request(input);
+      const Bytes pdu = modbus_request(device, input);
       // Where the stream is in step there is an answer, and it is to this request.
       if (in_step[k]) {
         device.ask(k, pdu);
@@ -45,7 +45,7 @@ void operate(Device& device, Input& input, std::array<bool, Device::connections>
     case portions: {
       in_step[k] = false;
       const unsigned at = input.u8();
-      const Bytes frame = frame_of(input);
+      const Bytes frame = frame_of(device, input);
       const auto cut = frame.begin() + static_cast<std::ptrdiff_t>(at % frame.size());
       device.tcp(k, Bytes(frame.begin(), cut));
       device.tcp(k, Bytes(cut, frame.end()));
@@ -70,7 +70,7 @@ void operate(Device& device, Input& input, std::array<bool, Device::connections>
       break;
     case storage: {
       const unsigned what = input.u8();
-      if (what < 96) device.fail_storage(what % 4);
+      if (what < 96) device.fail_storage(what % 4, what / 4);
       if (what >= 96 && what < 192) device.busy_storage(what % 8);
       if (what >= 192) device.cut_power_after(static_cast<std::uint32_t>(input.u16()) % 30000U);
       break;
@@ -105,6 +105,7 @@ std::vector<Bytes> seeds() {
   }
   all.push_back(many.out);
   add_command_seeds(before, other, all);
+  add_signed_seeds(before, all);
   all.push_back(Output()
                     .u8(0)
                     .add(modbus_push(before, 5, 3, 2))

@@ -6,6 +6,7 @@
 #include "exchange/name_pattern.hpp"
 #include "exchange/time_stamp.hpp"
 #include "host_text.hpp"
+#include "model/covariate.hpp"
 
 namespace fuzz::names_target {
 namespace {
@@ -36,7 +37,8 @@ void run(Input input) {
       }
       case 1:
         if (const auto stamp = time_stamp(text, *time_unit_of(time_unit_names().front()), decimal))
-          require(std::isfinite(stamp->seconds), "a time that is not finite");
+          require(std::isfinite(stamp->seconds) && flexcomp::host::words(stamp->clock)[0] != 0,
+                  "a time that is not finite");
         break;
       case 2:
         if (const auto number =
@@ -46,6 +48,9 @@ void run(Input input) {
         break;
       default:
         column_name(text);
+        if (const auto factor = factor_of(text)) require(factor_name(*factor) == text, "another factor");
+        if (const auto covariate = covariate_of(text))
+          require(covariate_name(covariate->first, covariate->second) == text, "another covariate");
         length_unit_of(text);
         angle_unit_of(text);
         time_unit_of(text);
@@ -65,6 +70,16 @@ std::vector<Bytes> seeds() {
           with_options({1}, "12.5e3"),
           with_options({2}, "-1234.5e-3"),
           with_options({10}, "1.234,5"),
+          with_options({1}, "2026-03-01T12:30:05.25"),
+          with_options({3}, "load_torque"),
+          with_options({3}, "temperature"),
+          with_options({3}, "payload"),
+          with_options({3}, "q3"),
+          with_options({3}, "payload_kg"),
+          with_options({3}, "temp_c"),
+          with_options({3}, "time_s"),
+          with_options({3}, "dir4"),
+          with_options({3}, "speed6"),
           with_options({3}, "Measured X [mm]"),
           with_options({3}, "j1_deg")};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Point lists of instruments. The first byte holds the options.
+// Point lists of instruments. The first two bytes hold the options.
 #include "tables.hpp"
 
 namespace fuzz::point_list_target {
@@ -8,7 +8,7 @@ namespace {
 using namespace flexcomp::host;
 
 void run(Input input) {
-  const PointListOptions options = point_options(input.u8());
+  const PointListOptions options = point_options(input.u16());
   const std::string path = path_of(input.text());
   reads([&] {
     const PointList list = read_point_list(path, options);
@@ -26,7 +26,8 @@ void run(Input input) {
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
   for (const std::string& text : point_lists) {
-    for (const unsigned what : {0U, 1U, 7U, 17U}) all.push_back(with_options({what}, text));
+    for (const unsigned what : {0U, 1U, 7U, 71U, 135U, 17U, 256U, 512U, 1025U})
+      all.push_back(with_options({what & 0xFFU, what >> 8U}, text));
   }
   return all;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Logs of robots. The first byte holds the map.
+// Logs of robots. The first two bytes hold the map.
 #include "tables.hpp"
 
 namespace fuzz::robot_log_target {
@@ -8,7 +8,7 @@ namespace {
 using namespace flexcomp::host;
 
 void run(Input input) {
-  const LogMap map = log_options(input.u8());
+  const LogMap map = log_options(input.u16());
   const std::string path = path_of(input.text());
   reads([&] {
     const RobotLog log = read_robot_log(path, map, tx60l());
@@ -27,7 +27,8 @@ void run(Input input) {
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
   for (const std::string& text : robot_logs) {
-    for (const unsigned what : {0U, 1U, 12U, 64U, 128U}) all.push_back(with_options({what}, text));
+    for (const unsigned what : {0U, 1U, 12U, 64U, 128U, 384U, 512U, 1024U, 2048U, 4096U, 8192U})
+      all.push_back(with_options({what & 0xFFU, what >> 8U}, text));
   }
   return all;
 }

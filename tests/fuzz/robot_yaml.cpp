@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot file: what is read is written so that the identical robot is read.
+// A robot file: what is read is written so that the identical robot is read; put into links of another form it is read, too.
+#include "exchange/imported_arm.hpp"
 #include "host_text.hpp"
 
 namespace fuzz::robot_yaml_target {
@@ -42,12 +43,32 @@ void run(Input input) {
               numbers(again) == numbers(robot),
           "another robot is read from what was written");
   require_same(written, robot_text(again, {"of a fuzz target"}), "a robot file");
+  ImportedArm arm;
+  if (!reads([&] { arm = import_robot(path_of(text)); })) return;
+  const std::string other = robot_text(arm.robot, {});
+  must_read(other, [&] { again = load_robot(path_of(other), LongLinks::taken); });
 }
 
 std::vector<Bytes> seeds() {
   std::vector<Bytes> all;
   for (const char* name : {"tx60l", "rx160l", "ur5", "ur10", "abb-irb120", "kuka-kr6-r900"})
     all.push_back(bytes_of(file_of(std::string("host/robots/") + name + ".yaml")));
+  const std::string text = file_of("host/robots/tx60l.yaml");
+  const auto add = [&](const std::string& what, const std::string& by) {
+    std::string out = text;
+    const std::size_t at = out.find(what);
+    require(at != std::string::npos, "a seed of a text that is not there");
+    all.push_back(bytes_of(out.replace(at, what.size(), by)));
+  };
+  add("name: ", "serial: \"arm 5\"\nname: ");
+  add("name: ", "serial: \"\"\nname: ");
+  add("name: ", "serial: [1]\nname: ");
+  add("d_mm: 450", "d_mm: 123456");
+  add("min_deg: -180", "min_deg: 190");
+  add("max_speed_deg_s: 435", "gear_ratio: 100");
+  add("max_speed_deg_s: 435", "gear_ratio: -1");
+  add("quaternion_wxyz: [1, 0, 0, 0]", "quaternion_wxyz: [1, 1, 0, 0]");
+  add("quaternion_wxyz: [1, 0, 0, 0]", "quaternion_wxyz: &a [1, 0, 0, 0], xyz_mm: *a");
   return all;
 }
 

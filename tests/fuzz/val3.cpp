@@ -41,15 +41,14 @@ void run(Input input) { play_program(input, flexcomp::host::ProgramLanguage::val
 std::vector<Bytes> seeds() {
   const std::string j = R"( j1="1" j2="2" j3="3" j4="4" j5="5" j6="6")";
   return {
-      with_options({1}, file_of("docs/examples/weld.dtx")),
-      with_options({1}, "<Data name=\"g\" type=\"joint\"><Value\nkey=\"0\"" + j + "/></Data>"),
-      with_options(
-          {0}, "<?xml version=\"1.0\"?>\n<Database>\n<Data name=\"a>b\" type=\"jointRx\"><Value key=\"0\"" +
-                   j + "/></Data>\n<Data name=\"vel\" type=\"mdesc\"><Value" + j + "/></Data>\n<!-- <Value" +
-                   j +
-                   "/> --><Data name=\"p\" type=\"pointRx\"><Value key=\"0\" x=\"1\" y=\"2\" z=\"3\" "
-                   "rx=\"0\" ry=\"0\" rz=\"0\"/></Data><valueJoint" +
-                   j + "/></Database>")};
+      ticket_seed(1, file_of("docs/examples/weld.dtx")),
+      ticket_seed(1, "<Data name=\"g\" type=\"joint\"><Value\nkey=\"0\"" + j + "/></Data>"),
+      ticket_seed(
+          0, "<?xml version=\"1.0\"?>\n<Database>\n<Data name=\"a>b\" type=\"jointRx\"><Value key=\"0\"" + j +
+                 "/></Data>\n<Data name=\"vel\" type=\"mdesc\"><Value" + j + "/></Data>\n<!-- <Value" + j +
+                 "/> --><Data name=\"p\" type=\"pointRx\"><Value key=\"0\" x=\"1\" y=\"2\" z=\"3\" "
+                 "rx=\"0\" ry=\"0\" rz=\"0\"/></Data><valueJoint" +
+                 j + "/></Database>")};
 }
 
 const Register registered({"val3", run, seeds, mutate_words<words>});

@@ -9,6 +9,11 @@
 
 #include "flexcomp.h"
 #include "flexcomp/image.hpp"
+#include "flexcomp/signature.hpp"
+#include "flexcomp/wire/canopen_objects.hpp"
+#include "flexcomp/wire/certificate_record.hpp"
+#include "flexcomp/wire/store_state.hpp"
+#include "flexcomp/wire/unit_record.hpp"
 #include "fuzz.hpp"
 
 namespace fuzz {
@@ -16,6 +21,7 @@ namespace fuzz {
 constexpr double most_rad = 2.2;  ///< joint limits of the arm, both ways
 constexpr unsigned node_id = 5;   ///< on CANopen
 constexpr unsigned unit_id = 17;  ///< on Modbus
+constexpr char serial[] = "fuzzed arm 5";
 
 using FirmwareScalar = flexcomp_real;
 using FirmwareTerm = flexcomp::Term<FirmwareScalar>;
@@ -55,14 +61,17 @@ inline flexcomp::ImageHeader binding() {
   return header;
 }
 
+/// `is_bound`: to this unit.
 inline Bytes image_of(const std::vector<FirmwareTerm>& terms, const std::vector<flexcomp::Table>& tables,
-                      const std::vector<FirmwareScalar>& values, std::uint32_t sequence) {
+                      const std::vector<FirmwareScalar>& values, std::uint32_t sequence,
+                      bool is_bound = false) {
   static const flexcomp::ImageHeader bound = binding();
   flexcomp::ImageHeader header = bound;
   header.sequence = sequence;
+  if (is_bound) header.unit_hash = flexcomp::name_hash(serial, std::strlen(serial));
   const flexcomp::TermList<FirmwareScalar> list{terms.data(),  terms.size(),  tables.data(),
                                                 tables.size(), values.data(), values.size()};
-  Bytes out(flexcomp::image_size(list));
+  Bytes out(flexcomp::image_size(list, is_bound));
   if (flexcomp::encode_image(list, header, out.data(), out.size()) == 0) finding("a seed that is no image");
   return out;
 }
@@ -70,7 +79,7 @@ inline Bytes image_of(const std::vector<FirmwareTerm>& terms, const std::vector<
 constexpr unsigned image_count = 7;
 
 /// Sets that are admitted: empty, geometry, loads, a curve and a wave, a grid, a bit of all; and one that costs too much.
-inline Bytes good_image(unsigned number, std::uint32_t sequence) {
+inline Bytes good_image(unsigned number, std::uint32_t sequence, bool is_bound = false) {
   using flexcomp::Basis;
   std::vector<FirmwareTerm> terms;
   std::vector<flexcomp::Table> tables;
@@ -135,7 +144,49 @@ inline Bytes good_image(unsigned number, std::uint32_t sequence) {
       add(1 + k % 6, k % 5, k % 2 == 0 ? Basis::sine : Basis::load_moment_x, k % 6, 1e-7).argument =
           static_cast<FirmwareScalar>(1 + k / 6);
   }
-  return image_of(terms, tables, values, sequence);
+  return image_of(terms, tables, values, sequence, is_bound);
+}
+
+// --- signatures --------------------------------------------------------------------------------------------
+
+/// Public keys. The signature of a message is its SHA-256 with the key before it: what the library does before and after
+/// Ed25519 is fuzzed, not Ed25519, which is the integrator's.
+constexpr unsigned key_count = 3;
+inline const std::uint8_t (*public_keys())[32] {
+  static std::uint8_t keys[key_count][32];
+  for (unsigned k = 0; k < key_count; ++k) std::fill(keys[k], keys[k] + 32, static_cast<std::uint8_t>(k + 1));
+  return keys;
+}
+inline std::array<std::uint8_t, 64> signature_of_message(const std::uint8_t* key,
+                                                         const std::uint8_t* message) {
+  flexcomp::Sha256 sha;
+  for (std::size_t k = 0; k < flexcomp::signing::key_bytes; ++k) sha.update(key[k]);
+  for (std::size_t k = 0; k < flexcomp::signing::message_bytes; ++k) sha.update(message[k]);
+  const flexcomp::Sha256Digest digest = sha.finish();
+  std::array<std::uint8_t, 64> signature{};
+  std::copy(digest.begin(), digest.end(), signature.begin());
+  std::copy(digest.begin(), digest.end(), signature.begin() + 32);
+  signature[63] &= 0x0FU;  // canonical
+  return signature;
+}
+inline std::array<std::uint8_t, 64> sign(flexcomp::Signed what, const std::uint8_t* bytes, std::size_t end,
+                                         unsigned key) {
+  return signature_of_message(public_keys()[key],
+                              flexcomp::signed_message(what, flexcomp::sha256(bytes, end)).data());
+}
+/// The signature record, and the CRC-32, are written anew.
+inline void mend_signature(Bytes& image, unsigned key) {
+  if (image.size() < flexcomp::image::header_bytes + 88 + flexcomp::image::crc_bytes) return;
+  const auto signature =
+      sign(flexcomp::Signed::set, image.data(), flexcomp::signature_offset(image.size()), key);
+  flexcomp::put_signature(image.data(), image.size(), signature.data());
+}
+inline Bytes signed_image(Bytes image, std::uint64_t counter, unsigned key) {
+  const std::size_t size = image.size();
+  image.resize(flexcomp::signed_size(size));
+  flexcomp::append_signature(image.data(), size, counter, flexcomp::key_id(public_keys()[key]));
+  mend_signature(image, key);
+  return image;
 }
 
 /// Writes the CRC-32 of an image anew.
@@ -153,13 +204,36 @@ inline std::uint16_t modbus_crc_of(const Bytes& bytes) {
   return static_cast<std::uint16_t>(crc);
 }
 
+/// What comes into the middle of a block transfer: the frame before its segment or sub-block of this number.
+struct Disturbance {
+  unsigned before = 0xFFFF;
+  Bytes frame;                ///< empty: the transfer ends there
+  unsigned milliseconds = 0;  ///< that pass
+  bool repeats = false;       ///< the frame is the one that went out last
+  bool pushes = false;        ///< another set becomes active meanwhile
+
+  static Disturbance from(Input& input) {
+    Disturbance by;
+    by.before = input.u8();
+    const unsigned how = input.u8();
+    by.repeats = (how & 1U) != 0;
+    by.pushes = (how & 2U) != 0;
+    if ((how & 4U) != 0) by.milliseconds = input.u16();
+    if ((how & 8U) == 0) by.frame = input.bytes(8);
+    return by;
+  }
+};
+
 /// The controller and its world.
 class Device {
  public:
   /// `start`: bits 0, 1: so many sets in the flash; bit 2: pass-through; bit 3: a cycle of a second, after which nothing holds
-  /// a correction back any more; bit 4: without hooks.
+  /// a correction back any more; bit 4: without hooks; bits 5, 6: 1 a key is trusted, 2 two keys, 3 only a serial number;
+  /// bit 7: nothing keeps what a CAN master has set up, and bytes of the serial line come in bursts.
   explicit Device(unsigned start) : start_(start) {
-    flash_ = flash_with(start & 3U);
+    flash_ = flash_with(start & 3U, trusted() != 0);
+    // A device that authorises everything needs no signed command.
+    if (trusted() != 0) allowed_ = 0xFFFF;
     power_on();
   }
   Device(const Device&) = delete;
@@ -182,32 +256,81 @@ class Device {
     if ((start_ & 4U) != 0) settings.on_refusal = FLEXCOMP_PASS_THROUGH;
     if ((start_ & 8U) != 0) settings.cycle_us = 1000000;
     const flexcomp_storage storage{this, read_slot, erase_slot, write_slot};
-    const flexcomp_robot robot = arm_of_the_paper();
+    flexcomp_robot robot = arm_of_the_paper();
+    if ((start_ & 0x60U) != 0) robot.serial = serial;
     arm_ = flexcomp_init(memory_.arm.get(), FLEXCOMP_MEMORY_BYTES, &robot, &settings, &storage);
     require(arm_ != nullptr, "init refused a good robot");
     const flexcomp_hooks hooks{this, permit, log};
     if ((start_ & 16U) == 0) flexcomp_set_hooks(arm_, &hooks);
+    if (trusted() != 0) {
+      const flexcomp_trust trust{this, public_keys(), trusted(), check_signature};
+      require(flexcomp_set_trust(arm_, &trust) == 1, "keys are not taken");
+    }
     fail_next_ = failing;
+    fail_after_ = 0;
     flexcomp_boot(arm_);
     fail_next_ = 0;
+    slow_checks_ = 0;
     can_ = flexcomp_can_init(memory_.can.get(), FLEXCOMP_CAN_BYTES, arm_, node_id, 100, send_frame, this);
-    rtu_ = flexcomp_rtu_init(memory_.rtu.get(), FLEXCOMP_RTU_BYTES, arm_, unit_id, 1750, send_rtu, this);
+    rtu_ = flexcomp_rtu_init(memory_.rtu.get(), FLEXCOMP_RTU_BYTES, arm_, unit_id,
+                             (start_ & 0x80U) == 0 ? 1750 : 20000, send_rtu, this);
     require(can_ != nullptr && rtu_ != nullptr, "init of a bus failed");
+    if ((start_ & 0x80U) == 0) flexcomp_can_set_memory(can_, load_can, save_can, this);
+    require(flexcomp_can_set_channel(can_, channel_request, channel_answer) != 0, "no second channel");
     for (std::size_t k = 0; k < tcp_.size(); ++k) {
       tcp_[k] = flexcomp_tcp_init(memory_.tcp[k].get(), FLEXCOMP_TCP_BYTES, arm_, unit_id, send_tcp, this);
       require(tcp_[k] != nullptr, "init of a connection failed");
     }
     seen_crc_ = 0;
+    counter_ = 0;
     check_active();
+    if (failing == 0) {
+      require(checks_ > 6 || counter_ >= told_counter_, "a counter that a start has told came back");
+      told_counter_ = std::max(told_counter_, counter_);
+    }
+    ++checks_;  // a start may use a place of the memory, too
   }
+  /// Keys that are trusted.
+  unsigned trusted() const { return (start_ >> 5U & 3U) % 3U; }
+  /// A good set for this device: signed where it trusts keys, with its sequence as counter.
+  Bytes image(unsigned number, std::uint32_t sequence, unsigned key = 0) const {
+    if (trusted() == 0) return good_image(number, sequence, (start_ & 0x60U) != 0);
+    return signed_image(good_image(number, sequence, true), sequence, key);
+  }
+  /// A signed command for the set that is active.
+  Bytes signed_command(unsigned command, std::uint64_t counter, unsigned key) {
+    Bytes bytes(flexcomp::signing::command_bytes);
+    flexcomp::SignedCommand c;
+    c.command = static_cast<std::uint16_t>(command);
+    c.active_crc = word(registers(0x0040, 48), 24);
+    c.counter = counter;
+    c.unit_hash = flexcomp::name_hash(serial, std::strlen(serial));
+    c.key_id = flexcomp::key_id(public_keys()[key]);
+    flexcomp::encode(c, bytes.data());
+    mend_command(bytes, key);
+    return bytes;
+  }
+  static void mend_command(Bytes& bytes, unsigned key) {
+    const auto signature =
+        sign(flexcomp::Signed::command, bytes.data(), flexcomp::signing::command_signature, key);
+    std::copy(signature.begin(), signature.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(flexcomp::signing::command_signature));
+    mend_crc(bytes);
+  }
+  /// The function that checks signatures wants so many more calls.
+  void slow_checks(unsigned count) { slow_checks_ = count; }
   /// A byte of the flash has changed while the power was off.
   void spoil(unsigned slot, std::uint32_t offset, unsigned by) {
     std::uint8_t& byte = flash_[slot % 2][offset % FLEXCOMP_SLOT_BYTES];
     byte = static_cast<std::uint8_t>(byte ^ by);
+    told_counter_ = 0;
     power_on();
   }
-  /// The storage hooks fail, or are busy, so many times from now.
-  void fail_storage(unsigned times) { fail_next_ = times; }
+  /// The storage hooks fail, or are busy, so many times from now, or after so many calls that go well.
+  void fail_storage(unsigned times, unsigned after = 0) {
+    fail_next_ = times;
+    fail_after_ = after;
+  }
   void busy_storage(unsigned times) { busy_next_ = times; }
   /// The power goes after so many more bytes have been programmed or erased.
   void cut_power_after(std::uint32_t bytes) { power_left_ = static_cast<std::int64_t>(bytes); }
@@ -317,16 +440,25 @@ class Device {
     flexcomp_can_poll(can_, now_ms_);
   }
   void refuse_frames(unsigned count) { refused_frames_ = count; }
-  void again_can() {
+  /// Another node in the same memory, with sub-blocks of so many frames, and with this second channel.
+  void again_can(unsigned frames = 63, unsigned request_id = 0, unsigned answer_id = 0) {
     std::memset(memory_.can.get(), 0x5A, FLEXCOMP_CAN_BYTES);
     can_ = flexcomp_can_init(memory_.can.get(), FLEXCOMP_CAN_BYTES, arm_, node_id, 0, send_frame, this);
+    flexcomp_can_set_block_size(can_, frames);
+    const bool is_open = flexcomp_can_set_channel(can_, request_id, answer_id) != 0;
+    require(flexcomp_can_channel(can_) == (is_open ? request_id : 0U), "a channel that was refused is open");
   }
+  /// What the memory of the node holds is another byte from the next reset on.
+  void spoil_can(unsigned at, unsigned value) { can_record_[at % 8] = static_cast<std::uint8_t>(value); }
+  /// Over which of the two SDO servers what follows goes.
+  void use_channel(bool is_second) { is_second_ = is_second; }
   /// An SDO request; the answer, empty where there is none.
   Bytes sdo(const Bytes& request) {
     answer_.clear();
     Bytes eight = request;
     eight.resize(8);
-    frame(0x600U + node_id, eight);
+    last_request_ = eight;
+    frame(is_second_ ? channel_request : 0x600U + node_id, eight);
     return answer_;
   }
   /// Download of an object by segments, or expedited: true where no answer was an abort.
@@ -354,8 +486,21 @@ class Device {
     }
     return answer.size() == 8 && (answer[0] & 0xEFU) == 0x20;
   }
+  /// True where the transfer goes on.
+  bool disturb(const Disturbance& by, unsigned at) {
+    if (at != by.before) return true;
+    if (by.milliseconds != 0) can_poll(by.milliseconds);
+    if (by.pushes) {
+      push(image(1, state().active_sequence + 1));
+      ordinary_steps(3);
+    }
+    if (by.repeats) sdo(last_request_);
+    if (!by.frame.empty()) sdo(by.frame);
+    return by.repeats || by.pushes || !by.frame.empty();
+  }
   /// Block download of an object (CiA 301, 7.2.4.3.9); `wrong` changes its CRC.
-  void block_download(unsigned index, unsigned sub, const Bytes& bytes, unsigned wrong) {
+  void block_download(unsigned index, unsigned sub, const Bytes& bytes, unsigned wrong,
+                      const Disturbance& by = {}) {
     Bytes answer =
         sdo(Output().u8(0xC6).u16(index).u8(sub).u32(static_cast<std::uint32_t>(bytes.size())).out);
     unsigned crc = wrong;
@@ -365,33 +510,41 @@ class Device {
         crc = (crc & 0x8000U) != 0 ? (crc << 1U ^ 0x1021U) & 0xFFFFU : crc << 1U & 0xFFFFU;
     }
     std::size_t at = 0;
+    unsigned segments = 0;
     while (at < bytes.size()) {
       if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xA0) return;
       const unsigned most = answer[0] == 0xA2 ? answer[2] : answer[4];
       for (unsigned number = 1; number <= most && at < bytes.size(); ++number, at += 7) {
         const std::size_t n = std::min<std::size_t>(7, bytes.size() - at);
         const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+        if (!disturb(by, segments++)) return;
         answer = sdo(Output()
                          .u8(number | (at + n == bytes.size() ? 0x80U : 0U))
                          .add(Bytes(from, from + static_cast<std::ptrdiff_t>(n)))
                          .out);
       }
     }
-    if (answer.size() == 8 && answer[0] == 0xA2)
-      sdo(Output().u8(0xC1U | static_cast<unsigned>(at - bytes.size()) << 2U).u16(crc).out);
+    if (answer.size() != 8 || answer[0] != 0xA2 || !disturb(by, 0xFF)) return;
+    const Bytes end = Output().u8(0xC1U | static_cast<unsigned>(at - bytes.size()) << 2U).u16(crc).out;
+    sdo(end);
+    if ((wrong & 1U) != 0) sdo(end);  // where its answer was lost
   }
   /// Block upload of an object, of which all but so many segments of a sub-block are said to have arrived.
-  void block_upload(unsigned index, unsigned sub, unsigned most, unsigned lost) {
-    Bytes answer = sdo(Output().u8(0xA4).u16(index).u8(sub).u8(most).u8(0).out);
-    if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xC0) return;
+  void block_upload(unsigned index, unsigned sub, unsigned most, unsigned lost, unsigned switch_to = 0,
+                    const Disturbance& by = {}) {
+    Bytes answer = sdo(Output().u8(0xA4).u16(index).u8(sub).u8(most).u8(switch_to).out);
+    if (answer.size() != 8 || (answer[0] & 0xE0U) != 0xC0 || !disturb(by, 0xFF)) return;
     answer = sdo({0xA3});
-    for (int blocks = 0; blocks < 40; ++blocks) {
+    for (unsigned blocks = 0; blocks < 40; ++blocks) {
+      if (!disturb(by, blocks)) return;
       for (int k = 0; k < 4; ++k) can_poll(1);
       if (answer_.size() != 8) return;
       const unsigned number = answer_[0] & 0x7FU;
-      answer = sdo(Output().u8(0xA2).u8(number > lost ? number - lost : 0).u8(most).out);
+      // Sizes of sub-blocks alternate, so that a copy is known.
+      const unsigned next = most > 1 && blocks % 2 == 0 ? most - 1 : most;
+      answer = sdo(Output().u8(0xA2).u8(number > lost ? number - lost : 0).u8(next).out);
       if (answer.size() == 8 && (answer[0] & 0xE3U) == 0xC1) {
-        sdo({0xA1});
+        if (disturb(by, 0xFE)) sdo({0xA1});
         return;
       }
       lost = 0;
@@ -466,7 +619,9 @@ class Device {
   void check_state() {
     if (is_dead_) return;
     const flexcomp_state s = state();
-    require(s.store <= 4, "a state that the protocol does not have");
+    require(
+        std::strcmp(flexcomp::wire::name(static_cast<flexcomp::wire::StoreState>(s.store)), "unknown") != 0,
+        "a state that the protocol does not have");
     require(s.faults <= 15, "a fault that the protocol does not have");
     require(s.active_bytes <= FLEXCOMP_STAGING_BYTES, "an active set longer than its memory");
     require((s.active_sequence == 0) || (s.active_bytes != 0), "a sequence without a set");
@@ -483,15 +638,10 @@ class Device {
     const unsigned failing = fail_next_;
     fail_next_ = 0;
     const Bytes status = registers(0x0040, 48);
-    const auto word = [&status](std::size_t at) {
-      return static_cast<std::uint32_t>(status[at]) << 24U |
-             static_cast<std::uint32_t>(status[at + 1]) << 16U |
-             static_cast<std::uint32_t>(status[at + 2]) << 8U | status[at + 3];
-    };
     const flexcomp_state s = state();
     const bool is_active = status[12] != 0xFF;
-    const std::uint32_t crc = word(24);
-    require(word(16) == s.active_sequence && word(20) == s.active_bytes,
+    const std::uint32_t crc = word(status, 24);
+    require(word(status, 16) == s.active_sequence && word(status, 20) == s.active_bytes,
             "status record and C interface differ");
     require(is_active == (s.active_bytes != 0), "an active set without bytes, or bytes without a set");
     // Reading is slow: the same set need not be read twice. While rollback and restore erase its slot it cannot be read.
@@ -512,10 +662,44 @@ class Device {
               "the active set is no whole image of this arm");
       require(header.sequence == s.active_sequence, "the active set has another sequence");
       require(flexcomp::load_u32(image.data() + image.size() - 4) == crc, "the active set has another CRC");
+      if (trusted() != 0) check_signed(image);
+      check_certificate();
       seen_crc_ = crc;
     }
     if (!is_active) seen_crc_ = 0;
+    namespace wire = flexcomp::wire;
+    const Bytes told = registers(wire::modbus::unit, wire::modbus::unit_registers);
+    wire::UnitRecord unit;
+    wire::decode(told.data(), wire::ByteOrder::big, unit);
+    require(unit.keys == trusted() && unit.counter >= counter_, "other keys, or the counter went back");
+    counter_ = unit.counter;
     fail_next_ = failing;
+  }
+  /// The certificate is read as it is written.
+  void check_certificate() {
+    namespace wire = flexcomp::wire;
+    const Bytes told = registers(wire::modbus::certificate, wire::modbus::certificate_registers);
+    wire::CertificateRecord record;
+    wire::decode(told.data(), wire::ByteOrder::big, record);
+    Bytes again(told.size());
+    wire::encode(record, wire::ByteOrder::big, again.data());
+    require(again == told, "a certificate that is not read as it is written");
+  }
+  /// The active set of a device that trusts keys is bound to this unit, and one of them has signed it.
+  void check_signed(const Bytes& image) const {
+    using namespace flexcomp;
+    const Sha256Digest unit = name_hash(serial, std::strlen(serial));
+    const std::uint8_t* bound = bound_unit(image.data(), image.size());
+    require(bound != nullptr && std::equal(unit.begin(), unit.end(), bound),
+            "the active set is not bound to this unit");
+    const std::uint8_t* record = signature_of(image.data(), image.size());
+    require(record != nullptr, "the active set is not signed");
+    bool is_known = false;
+    for (unsigned key = 0; key < trusted(); ++key) {
+      const auto good = sign(Signed::set, image.data(), signature_offset(image.size()), key);
+      is_known = is_known || std::equal(good.begin(), good.end(), record + signing::record_signature);
+    }
+    require(is_known, "the active set is signed by nobody");
   }
 
   /// At the end of every operation.
@@ -525,6 +709,8 @@ class Device {
   }
 
  private:
+  static constexpr unsigned channel_request = flexcomp::wire::canopen::channel_request_id + node_id;
+  static constexpr unsigned channel_answer = flexcomp::wire::canopen::channel_answer_id + node_id;
   using Slots = std::array<std::array<std::uint8_t, FLEXCOMP_SLOT_BYTES>, 2>;
   /// Blocks of exactly the sizes that flexcomp.h names, so that a sanitizer sees their ends.
   struct Memory {
@@ -537,17 +723,22 @@ class Device {
         std::unique_ptr<unsigned char[]>(new unsigned char[FLEXCOMP_TCP_BYTES])};
   };
 
-  /// Flash with so many sets, as a controller left it.
-  static const Slots& flash_with(unsigned sets) {
-    static const std::array<Slots, 4> all = [] {
+  static std::uint32_t word(const Bytes& record, std::size_t at) {
+    return static_cast<std::uint32_t>(record[at]) << 24U | static_cast<std::uint32_t>(record[at + 1]) << 16U |
+           static_cast<std::uint32_t>(record[at + 2]) << 8U | record[at + 3];
+  }
+
+  /// Flash with so many sets, as a controller left it that trusts keys or does not.
+  static const Slots& flash_with(unsigned sets, bool is_signed) {
+    static const auto make = [](unsigned start) {
       std::array<Slots, 4> made;
       for (Slots& slots : made) {
         for (auto& slot : slots) slot.fill(0xFF);
       }
-      const auto after = [](const Slots& before, const Bytes& image) {
-        Device device(before);
+      const auto after = [start](const Slots& before, unsigned number, std::uint32_t sequence) {
+        Device device(before, start);
         device.ordinary_steps(1);  // it takes up what was loaded; before that the store is busy
-        const unsigned answer = device.push(image);
+        const unsigned answer = device.push(device.image(number, sequence));
         const flexcomp_state s = device.state();
         if (answer != 0) {
           finding(std::string("a good set was not taken: ") + flexcomp_answer_text(answer) + ", " +
@@ -555,13 +746,16 @@ class Device {
         }
         return device.flash_;
       };
-      made[1] = after(made[0], good_image(2, 7));
-      made[2] = after(made[1], good_image(5, 8));
+      made[1] = after(made[0], 2, 7);
+      made[2] = after(made[1], 5, 8);
       return made;
-    }();
-    return all[sets];
+    };
+    static const std::array<Slots, 4> all = make(16);
+    if (!is_signed) return all[sets];
+    static const std::array<Slots, 4> all_signed = make(16 + 32);
+    return all_signed[sets];
   }
-  explicit Device(const Slots& flash) : start_(16), flash_(flash) { power_on(); }
+  Device(const Slots& flash, unsigned start) : start_(start), flash_(flash) { power_on(); }
 
   template <std::size_t N>
   static void require_finite(const std::array<flexcomp_real, N>& values, const char* of) {
@@ -645,7 +839,12 @@ class Device {
   }
   bool fails() {
     if (fail_next_ == 0) return false;
+    if (fail_after_ != 0) {
+      --fail_after_;
+      return false;
+    }
     --fail_next_;
+    told_counter_ = 0;  // what cannot be written is lost with the power
     return true;
   }
   bool is_busy() {
@@ -676,6 +875,35 @@ class Device {
   }
   static void log(void*, unsigned event, std::uint32_t) { require(event >= 1, "an event without a number"); }
 
+  static int check_signature(void* self, const std::uint8_t* key, const std::uint8_t* signature,
+                             const std::uint8_t* message, std::size_t size) {
+    Device& d = *static_cast<Device*>(self);
+    require(size == flexcomp::signing::message_bytes, "a message of another length");
+    require(key[0] >= 1 && key[0] <= d.trusted() && key[31] == key[0], "a key that is not trusted");
+    require(flexcomp::is_canonical_signature(signature), "a second form of a signature was asked about");
+    if (d.slow_checks_ != 0) {
+      --d.slow_checks_;
+      return 2;
+    }
+    const auto good = signature_of_message(key, message);
+    // Any other number than 1 and 2 is a no.
+    if (!std::equal(good.begin(), good.end(), signature)) return signature[0] == 0 ? -1 : signature[0] + 2;
+    ++d.checks_;
+    return 1;
+  }
+  static int load_can(void* self, std::uint8_t* bytes) {
+    const Device& d = *static_cast<Device*>(self);
+    std::copy(d.can_record_.begin(), d.can_record_.end(), bytes);
+    return d.has_can_record_ ? 1 : 0;
+  }
+  static int save_can(void* self, const std::uint8_t* bytes) {
+    Device& d = *static_cast<Device*>(self);
+    if (d.fails()) return 0;
+    std::copy_n(bytes, d.can_record_.size(), d.can_record_.begin());
+    d.has_can_record_ = true;
+    return 1;
+  }
+
   static int send_frame(void* self, std::uint16_t id, const std::uint8_t* bytes, std::uint8_t size) {
     Device& d = *static_cast<Device*>(self);
     require(id < 0x800 && size <= 8, "no frame of CAN");
@@ -689,7 +917,7 @@ class Device {
       --d.refused_frames_;
       return 0;
     }
-    if (id == 0x580U + node_id) d.answer_.assign(bytes, bytes + size);
+    if (id == (d.is_second_ ? channel_answer : 0x580U + node_id)) d.answer_.assign(bytes, bytes + size);
     return 1;
   }
   static void send_rtu(void*, const std::uint8_t* bytes, std::size_t size) {
@@ -721,6 +949,7 @@ class Device {
       false;  ///< by a command that was used or by start: before that a refused command goes out as it is
   std::int64_t power_left_ = -1;
   unsigned fail_next_ = 0;
+  unsigned fail_after_ = 0;
   unsigned busy_next_ = 0;
   unsigned refused_frames_ = 0;
   unsigned allowed_ = 0xFFFFFFFF;
@@ -729,6 +958,16 @@ class Device {
   std::uint32_t at_ = 0;
   unsigned transaction_ = 0;
   std::uint32_t seen_crc_ = 0;
+  std::uint64_t counter_ = 0;       ///< the last one that was read, since the start
+  std::uint64_t told_counter_ = 0;  ///< the highest that a start has told
+  /// Signatures that were right, and starts: each takes a place of a memory that has few (docs/security.md, "Left to the
+  /// integrator").
+  unsigned checks_ = 0;
+  unsigned slow_checks_ = 0;
+  std::array<std::uint8_t, flexcomp::wire::canopen::communication_bytes> can_record_{};
+  bool has_can_record_ = false;
+  bool is_second_ = false;
+  Bytes last_request_;
   Bytes answer_;
   unsigned answers_ = 0;
 };

@@ -513,6 +513,17 @@ TEST(UrdfRefusals, JointsThatAreNotSixTurningOnes) {
           {"bad.urdf:22: ", "lower limit below", "-4"});
 }
 
+// Found by fuzzing: both wrote robot files with numbers that are none.
+TEST(UrdfRefusals, NumbersAtTheEndOfTheRange) {
+  const auto imported = [](const std::string& text) {
+    return import_urdf(support::write("ends.urdf", text), {});
+  };
+  const ImportedArm far = imported(replaced(kuka, "<axis xyz=\"-1 0 0\"/>", "<axis xyz=\"-1e308 0 0\"/>"));
+  const ImportedArm near = imported(kuka);
+  EXPECT_EQ(nominal_hash(far.robot.nominal), nominal_hash(near.robot.nominal)) << "the same direction";
+  refused(replaced(kuka, "0.455 0 0", "1e308 1e308 1e308"), "", {"finite places"});
+}
+
 TEST(UrdfRefusals, LinksThatAreNotThere) {
   refused(kuka, "tip", {"did you mean 'tool0'", "'tool'"}, {"", "tool", ""});
   refused(kuka, "base", {"one of the links", "base_link", "'zzzzzzzz'"}, {"zzzzzzzz", "", ""});
