@@ -5,14 +5,14 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <string>
+#include <string_view>
 
 #include "support/slope_search.hpp"
 
 namespace {
 
 struct Options {
-  std::string arm;
+  std::string_view arm;
   double seconds = 20;
   long evaluations = 0;
   std::uint64_t seed = 1;
@@ -41,7 +41,7 @@ int usage() {
 bool read(int argc, char** argv, Options& o) {
   for (int k = 1; k < argc; k += 2) {
     if (k + 1 == argc) return false;
-    const std::string name = argv[k];
+    const std::string_view name = argv[k];
     const char* const value = argv[k + 1];
     if (name == "--arm") {
       o.arm = value;
@@ -95,7 +95,7 @@ void search(const arms::Arm& arm, const Options& o) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   Options options;
   if (!read(argc, argv, options)) return usage();
   bool found = false;
@@ -105,4 +105,7 @@ int main(int argc, char** argv) {
     search(arm, options);
   }
   return found ? 0 : usage();
+} catch (...) {
+  std::fputs("slope_search: out of memory\n", stderr);
+  return 1;
 }

@@ -15,7 +15,6 @@ namespace flexcomp::host {
 namespace {
 
 using fake::ModbusServer;
-using fake::numbered_bytes;
 using fake::numbered_image;
 using fake::quick;
 using std::chrono::milliseconds;
