@@ -115,7 +115,7 @@ std::string error_sentence(const Diagnosis& d, const std::optional<HeldOut>& oth
   return fmt::format("Position error {:.3f} -> {:.3f} mm (mean of {}).", before.mean_m * 1e3,
                      after.mean_m * 1e3,
                      others ? fmt::format("{} rows that were not fitted", others->rows)
-                            : "the fitted rows; --holdout tells it of others");
+                            : "the fitted rows");
 }
 
 std::string remainder_sentence(const Remainder& remainder) {
