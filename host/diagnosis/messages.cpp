@@ -114,8 +114,7 @@ std::string error_sentence(const Diagnosis& d, const std::optional<HeldOut>& oth
   const ErrorStatistics& after = others ? others->after : d.error_after;
   return fmt::format("Position error {:.3f} -> {:.3f} mm (mean of {}).", before.mean_m * 1e3,
                      after.mean_m * 1e3,
-                     others ? fmt::format("{} rows that were not fitted", others->rows)
-                            : "the fitted rows");
+                     others ? fmt::format("{} rows that were not fitted", others->rows) : "the fitted rows");
 }
 
 std::string remainder_sentence(const Remainder& remainder) {
