@@ -20,7 +20,7 @@ struct FittedModel {
 
 /// Fits a calibration's own parameters again. What it was given and did not fit stays fixed; an effect `unnamed` too, so
 /// that its cause is searched anew. Curves that were fitted are left out for the same reason.
-FittedModel fit_calibration(const Calibration& calibration, const Robot& robot,
+FittedModel fit_calibration(const Calibration& given, const Robot& robot,
                             const std::vector<Observation>& rows, std::uint64_t seed);
 
 /// Whether a calibration has curves that were fitted.
@@ -32,9 +32,10 @@ struct Refit : FittedModel {
 };
 
 /// Fits the start's parameters and those of the hypotheses; unnamed functions enter as fixed tables.
+/// \param declared  rows with the noise that was declared
 /// \param curves  prior of the joints' curves, named or carried, and the noise (D19); null: named curves get a prior of their
 ///                own size (empirical Bayes, D16)
-Refit refit_model(const Robot& robot, const std::vector<Observation>& rows, const FittedModel& start,
+Refit refit_model(const Robot& robot, const std::vector<Observation>& declared, const FittedModel& start,
                   const SearchResult& found, const CurveMaximum* curves = nullptr);
 
 }  // namespace flexcomp::host

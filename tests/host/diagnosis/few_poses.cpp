@@ -59,7 +59,7 @@ Positions positions_of(const FewPoses& rows, const Identification& start,
 double mean_norm(const Eigen::VectorXd& left_mm) {
   double sum = 0;
   for (Eigen::Index k = 0; k < left_mm.size(); k += 3) sum += left_mm.segment<3>(k).norm();
-  return sum / static_cast<double>(left_mm.size() / 3) * 1e-3;
+  return sum / (static_cast<double>(left_mm.size()) / 3) * 1e-3;
 }
 
 Eigen::MatrixXd fourier_columns(const Positions& p) {
