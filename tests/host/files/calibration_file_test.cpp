@@ -182,9 +182,8 @@ TEST(CalibrationFile, OfSixCurvesIsSmallAndQuicklyRead) {
   const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   std::printf("  six curves: %zu bytes, read in %.2f s\n", static_cast<std::size_t>(bytes), seconds);
   EXPECT_LE(bytes, 500'000U);
-#if !defined(__SANITIZE_ADDRESS__)
-  EXPECT_LT(seconds, 0.8);
-#endif
+  // On an idle machine 0.2 s; a sanitizer takes some ten times as long.
+  EXPECT_LT(seconds, 5);
   EXPECT_EQ(calibration_text(again, tx60l()), support::read(path));
   // The curves' rows are read to the last bit; the others have nine digits, `own` six.
   ASSERT_EQ(again.covariance->factor.cols(), c.covariance->factor.cols());
