@@ -4,9 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
+#include <cstdint>
 #include <ctime>
 #include <filesystem>
 #include <random>
@@ -77,7 +78,9 @@ void refused(const std::string& text, std::size_t line, const std::string& field
   expect_refused([&] { load(text); }, line, field, parts);
 }
 
-bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
 
 void expect_identical(const TermSet& a, const TermSet& b) {
   ASSERT_EQ(a.terms.size(), b.terms.size());
