@@ -75,12 +75,11 @@ void add_compensate(CLI::App& app) {
       "seed1_deg … seed6_deg; context columns as in data files. Or a program: KUKA .src .dat, ABB .mod, "
       "Stäubli .dtx")
       ->required();
-  add_value(command, "-o,--output", options.out, "FILE",
-            "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status "
-            "(ok, or all "
-            "that hold of near_singular limited at_limit not_converged no_set refused, joined by +); of a "
-            "program, the "
-            "program with its targets corrected")
+  add_value(
+      command, "-o,--output", options.out, "FILE",
+      "q1_deg … q6_deg (corrected), residual_mm, residual_deg (what the model still misses), status "
+      "(ok, or all that hold of near_singular limited at_limit not_converged no_set refused, joined by +); "
+      "of a program, the program with its targets corrected")
       ->required();
   options.programs.add_to(command);
   command.add_flag("--allow-unnamed", options.allow_unnamed, "Also use what was found but not understood");

@@ -37,8 +37,8 @@ void show_status(const BusOptions& bus) {
   const std::unique_ptr<ControllerClient> client = bus.connect();
   const wire::Capability& can = client->capability();
   const wire::Status now = client->status();
-  const std::optional<ControllerUnit> unit = client->unit();
   const std::optional<Robot> robot = client->robot();
+  const std::optional<ControllerUnit> unit = client->unit();
 
   const auto state = wire::name(static_cast<wire::StoreState>(now.state));
   const auto answer =

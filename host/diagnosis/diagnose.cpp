@@ -52,11 +52,7 @@ void compare(Diagnosis& out, const Robot& robot, const std::vector<Observation>&
   out.outliers = refit.fit.outliers();
   out.chi2_per_dof_before = start.fit.chi2_per_dof();
   // Not the refit's own chi-square: its rows may have the noise of scatter besides.
-  const std::vector<bool> has_full_weight = refit.fit.has_full_weight(rows.size());
-  double chi2 = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (has_full_weight[k]) chi2 += whitened(rows[k], out.residuals_after[k]).squaredNorm();
-  }
+  const double chi2 = chi2_of(out.residuals_after, rows, refit.fit.has_full_weight(rows.size()));
   out.chi2_per_dof_after = chi2 / std::max(1.0, refit.fit.degrees_of_freedom);
   out.degrees_of_freedom_after = refit.fit.degrees_of_freedom;
 }
@@ -85,9 +81,10 @@ std::vector<PlaceShare> place_shares_beside_curves(const Diagnosis& d, const Fit
 /// The measured part of every carried curve; those without a name are marked in the calibration.
 void describe_remainder(Diagnosis& out, const Refit& refit, const Robot& robot,
                         const std::vector<Observation>& rows) {
+  const std::vector<EffectGroup> groups = effects_of(refit.fit.estimate.set, robot.nominal);
   for (CarriedCurve& curve : out.remainder->curves) {
     if (!curve.named) out.after.regularised.push_back(curve.joint);
-    for (const EffectGroup& group : effects_of(refit.fit.estimate.set, robot.nominal)) {
+    for (const EffectGroup& group : groups) {
       if (group.id.joint != curve.joint) continue;
       if (const auto span = curve_span(refit, group, rows)) curve.span = *span;
     }

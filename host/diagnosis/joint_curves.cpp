@@ -100,12 +100,15 @@ CurveEvidence::CurveEvidence(const SubsetSearch& search, const std::vector<Obser
     Eigen::VectorXd wave(static_cast<Eigen::Index>(rows.size()));
     for (int n = 1; n <= highest_order; ++n) {
       const Eigen::Index at = static_cast<Eigen::Index>(j) * per_joint + 2 * (n - 1);
-      for (std::size_t k = 0; k < rows.size(); ++k)
-        wave[static_cast<Eigen::Index>(k)] = system.counts[k] ? std::cos(n * rows[k].q_rad[j]) : 0.0;
-      curves_.col(at) = times(place, wave);
-      for (std::size_t k = 0; k < rows.size(); ++k)
-        wave[static_cast<Eigen::Index>(k)] = system.counts[k] ? std::sin(n * rows[k].q_rad[j]) : 0.0;
-      curves_.col(at + 1) = times(place, wave);
+      for (const bool is_sine : {false, true}) {
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+          const double angle = n * rows[k].q_rad[j];
+          wave[static_cast<Eigen::Index>(k)] = !system.counts[k] ? 0.0
+                                               : is_sine         ? std::sin(angle)
+                                                                 : std::cos(angle);
+        }
+        curves_.col(at + is_sine) = times(place, wave);
+      }
     }
   }
   // Blocks in coefficients of unit variance.
@@ -263,17 +266,13 @@ bool CurveEvidence::evaluate(const Features& f, const Eigen::VectorXd& log, bool
   return std::isfinite(out.value);
 }
 
-Eigen::VectorXd CurveEvidence::scan(const Subset& blocks, const std::array<bool, joint_count>& joints,
-                                    double* best) const {
+CurveEvidence::Scan CurveEvidence::scan(const Subset& blocks,
+                                        const std::array<bool, joint_count>& joints) const {
   // The joints one by one: a few hundred columns less than all at once.
-  const auto count = std::ranges::count(joints, true);
-  Eigen::VectorXd start = Eigen::VectorXd::Zero(at_sizes + count);
-  start[at_corner] = std::log(usual_corner);
-  Eigen::VectorXd none = Eigen::VectorXd::Zero(at_sizes);
-  none[at_corner] = start[at_corner];
+  Scan out{Eigen::VectorXd::Zero(at_sizes + std::ranges::count(joints, true)), 0};
+  out.log[at_corner] = std::log(usual_corner);
   Point without;
-  evaluate(features(blocks, {}), none, false, without);
-  if (best != nullptr) *best = 0;
+  evaluate(features(blocks, {}), out.log.head<at_sizes>(), false, without);
   Eigen::Index at = at_sizes;
   for (std::size_t j = 0; j < joint_count; ++j) {
     if (!joints[j]) continue;
@@ -289,21 +288,21 @@ Eigen::VectorXd CurveEvidence::scan(const Subset& blocks, const std::array<bool,
         Point here;
         if (!evaluate(f, log, false, here) || here.value - without.value <= most) continue;
         most = here.value - without.value;
-        start[at] = most > 0 ? log[at_sizes] : std::log(0.3);
+        out.log[at] = most > 0 ? log[at_sizes] : std::log(0.3);
       }
     }
-    if (best != nullptr) *best = std::max(*best, most);
+    out.gain = std::max(out.gain, most);
     ++at;
   }
-  return start;
+  return out;
 }
 
-bool CurveEvidence::is_worth_trying() const {
+std::optional<CurveMaximum> CurveEvidence::maximum_where_any_gains() const {
   std::array<bool, joint_count> all{};
   all.fill(true);
-  double best = 0;
-  scan(blocks_, all, &best);
-  return best > 0;
+  const Scan start = scan(blocks_, all);
+  if (!(start.gain > 0)) return {};
+  return climb(features(blocks_, all), start.log, all);
 }
 
 Eigen::VectorXd CurveEvidence::logarithms(const CurveMaximum& at,
@@ -327,16 +326,15 @@ double CurveEvidence::value_without(const Subset& blocks, const std::array<bool,
 
 CurveMaximum CurveEvidence::maximum(const Subset& blocks, const std::array<bool, joint_count>& joints,
                                     const CurveMaximum* start) const {
+  return climb(features(blocks, joints),
+               start == nullptr ? scan(blocks, joints).log : logarithms(*start, joints), joints);
+}
+
+CurveMaximum CurveEvidence::climb(const Features& f, Eigen::VectorXd log,
+                                  const std::array<bool, joint_count>& joints) const {
   constexpr int most_steps = 60;
   constexpr double longest_step = 1.5;
   constexpr double converged = 0.05;
-  const Features f = features(blocks, joints);
-  Eigen::VectorXd log;
-  if (start == nullptr) {
-    log = scan(blocks, joints, nullptr);
-  } else {
-    log = logarithms(*start, joints);
-  }
   // BFGS (Nocedal and Wright 2006, Algorithm 6.1) on the negative of the value, steps halved until they gain.
   const Eigen::Index n = log.size();
   Point now;

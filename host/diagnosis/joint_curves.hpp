@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/subset_search.hpp"
@@ -49,8 +50,8 @@ class CurveEvidence {
  public:
   CurveEvidence(const SubsetSearch& search, const std::vector<Observation>& rows, const Subset& blocks);
 
-  /// Whether the curve of some joint, alone and beside the blocks, gains at any of a few sizes: else none does.
-  bool is_worth_trying() const;
+  /// The maximum with all blocks and joints; nothing where no curve, alone beside the blocks, gains at any of a few sizes.
+  std::optional<CurveMaximum> maximum_where_any_gains() const;
 
   /// \param blocks  some of those that were given \param start  where the search for the maximum begins; null: a scan
   CurveMaximum maximum(const Subset& blocks, const std::array<bool, joint_count>& joints,
@@ -79,7 +80,13 @@ class CurveEvidence {
   Features features(const Subset& blocks, const std::array<bool, joint_count>& joints) const;
   bool evaluate(const Features& f, const Eigen::VectorXd& log_sizes, bool with_slope, Point& out) const;
   static Eigen::VectorXd logarithms(const CurveMaximum& at, const std::array<bool, joint_count>& joints);
-  Eigen::VectorXd scan(const Subset& blocks, const std::array<bool, joint_count>& joints, double* best) const;
+  struct Scan {
+    Eigen::VectorXd log;  ///< where to start
+    double gain = 0;      ///< largest of one joint alone
+  };
+  Scan scan(const Subset& blocks, const std::array<bool, joint_count>& joints) const;
+  CurveMaximum climb(const Features& f, Eigen::VectorXd log,
+                     const std::array<bool, joint_count>& joints) const;
 
   Subset blocks_;
   std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_of_block_;

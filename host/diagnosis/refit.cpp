@@ -183,18 +183,24 @@ void centre_curve(TermSet& set, const Term<double>& term, const Robot& robot) {
   }
 }
 
+/// Rows with the noise that the curves leave.
+std::vector<Observation> with_noise_of(const CurveMaximum& curves, std::vector<Observation> rows) {
+  for (Observation& row : rows) {
+    row.whitening.topRows<3>() /= curves.position_noise;
+    row.whitening.bottomRows<3>() /= curves.orientation_noise;
+  }
+  return rows;
+}
+
 }  // namespace
 
 Refit refit_model(const Robot& robot, const std::vector<Observation>& declared, const FittedModel& start,
                   const SearchResult& found, const CurveMaximum* curves) {
   Refit out;
   const Estimate& at = start.fit.estimate;
-  std::vector<Observation> rows = declared;
-  for (Observation& row : rows) {
-    if (curves == nullptr) break;
-    row.whitening.topRows<3>() /= curves->position_noise;
-    row.whitening.bottomRows<3>() /= curves->orientation_noise;
-  }
+  const std::vector<Observation> rescaled =
+      curves != nullptr ? with_noise_of(*curves, declared) : std::vector<Observation>();
+  const std::vector<Observation>& rows = curves != nullptr ? rescaled : declared;
   ExtendedModel extended = extended_model(robot, rows, start, found, curves);
   EstimatorOptions options{.spectrum = false};
   // On the way to a curve's prior no more than near the minimum.
@@ -219,23 +225,13 @@ namespace {
 /// Whether a term reads a curve that was fitted, named or carried: its cause is searched anew.
 bool is_fitted_curve(const Term<double>& term, const Calibration& calibration) {
   if (term.effect != Effect::joint_curve || term.factor != Factor::one) return false;
-  if (std::ranges::find(calibration.regularised, term.joint + 1U) != calibration.regularised.end())
-    return true;
+  if (calibration.is_regularised(term.joint + 1U)) return true;
   const Table& table = calibration.terms.tables[term.table];
   for (std::size_t k = table.offset; k < table.offset + std::size_t{table.size}; ++k) {
     if (k < calibration.value_sigma.size() && std::isfinite(calibration.value_sigma[k])) return true;
   }
   return false;
 }
-
-}  // namespace
-
-bool has_fitted_curves(const Calibration& calibration) {
-  return std::ranges::any_of(calibration.terms.terms,
-                             [&](const Term<double>& t) { return is_fitted_curve(t, calibration); });
-}
-
-namespace {
 
 Calibration without_curves(Calibration calibration) {
   const Calibration all = calibration;
@@ -251,6 +247,11 @@ Calibration without_curves(Calibration calibration) {
 }
 
 }  // namespace
+
+bool has_fitted_curves(const Calibration& calibration) {
+  return std::ranges::any_of(calibration.terms.terms,
+                             [&](const Term<double>& t) { return is_fitted_curve(t, calibration); });
+}
 
 FittedModel fit_calibration(const Calibration& given, const Robot& robot,
                             const std::vector<Observation>& rows, std::uint64_t seed) {

@@ -37,11 +37,9 @@ class Weighing {
 
   /// False: no curves.
   bool begin() {
-    if (!evidence_.is_worth_trying()) return false;
-    Joints all;
-    all.fill(true);
-    at_ = evidence_.maximum(blocks_, all);
-    return true;
+    const auto best = evidence_.maximum_where_any_gains();
+    if (best) at_ = *best;
+    return best.has_value();
   }
 
   double gain_of_all() const { return at_.value - evidence_.maximum(blocks_, {}).value; }
@@ -153,12 +151,8 @@ Misfit misfit_of(const Remainder& remainder, const SearchResult& found) {
 /// Whether chi-square says that the refit leaves more than the declared noise (D14).
 bool leaves_more_than_noise(const Refit& refit, const Robot& robot, const std::vector<Observation>& rows,
                             double noise_scale2) {
-  const std::vector<bool> has_full_weight = refit.fit.has_full_weight(rows.size());
-  const std::vector<RowResidual> left = residuals(refit.fit.estimate, robot, rows, "diagnosis");
-  double chi2 = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (has_full_weight[k]) chi2 += whitened(rows[k], left[k]).squaredNorm();
-  }
+  const double chi2 = chi2_of(residuals(refit.fit.estimate, robot, rows, "diagnosis"), rows,
+                              refit.fit.has_full_weight(rows.size()));
   const double dof = refit.fit.degrees_of_freedom;
   return dof >= 1 && chi2 / noise_scale2 > chi2_quantile(0.9995, dof);
 }

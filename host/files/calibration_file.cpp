@@ -485,7 +485,7 @@ std::vector<std::string> selectors_text(const EffectId& id) {
 std::string effect_text(const Calibration& c, const EffectGroup& group) {
   std::vector<std::string> parts = selectors_text(group.id);
   if (group.id.effect == Effect::joint_curve && group.id.factor == Factor::one &&
-      std::ranges::find(c.regularised, group.id.joint) != c.regularised.end())
+      c.is_regularised(group.id.joint))
     parts.emplace_back("regularised: true");
   if (descriptor(group.id.effect).table != TableKind::none) {
     std::vector<std::string> values;

@@ -59,4 +59,13 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+double chi2_of(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows,
+               const std::vector<bool>& counts) {
+  double chi2 = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (counts[k]) chi2 += whitened(rows[k], residuals[k]).squaredNorm();
+  }
+  return chi2;
+}
+
 }  // namespace flexcomp::host

@@ -24,6 +24,10 @@ ErrorStatistics statistics(const std::vector<RowResidual>& errors, const std::ve
 /// Chi-square: sum of squared whitened residuals, of all rows given (M42, M51).
 double chi_square(const std::vector<RowResidual>& errors, const std::vector<Observation>& rows);
 
+/// Sum of the squared whitened residuals of the rows that count (M51).
+double chi2_of(const std::vector<RowResidual>& residuals, const std::vector<Observation>& rows,
+               const std::vector<bool>& counts);
+
 /// Numbers measured by a row: 6 for a pose, 3 for a position.
 inline double measured_numbers(const Observation& row) { return row.has_orientation ? 6 : 3; }
 /// Sum over rows.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -61,6 +62,9 @@ struct Calibration {
   std::string date;  ///< ISO 8601
   std::optional<std::uint32_t> sequence;
 
+  bool is_regularised(unsigned joint) const {
+    return std::find(regularised.begin(), regularised.end(), joint) != regularised.end();
+  }
   Pose<double> f() const { return frames ? frames->f.pose() : Pose<double>(); }
   Pose<double> e() const { return frames ? frames->e.pose() : Pose<double>(); }
 };

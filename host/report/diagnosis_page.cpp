@@ -189,9 +189,7 @@ PageSection effects_section(const Diagnosis& d, const Robot& robot, const std::v
     section.figures.push_back(unnamed_figure(d.after, group));
   }
   for (const EffectGroup& group : effects_of(d.after.terms, robot.nominal)) {
-    if (group.id.effect != Effect::joint_curve ||
-        std::ranges::find(d.after.regularised, group.id.joint) == d.after.regularised.end())
-      continue;
+    if (group.id.effect != Effect::joint_curve || !d.after.is_regularised(group.id.joint)) continue;
     if (const auto profile = profile_of(robot, d.after, group.id, rows)) {
       for (auto& figure : figures_of(*profile, name(group.id) + ", without a name"))
         section.figures.push_back(std::move(figure));

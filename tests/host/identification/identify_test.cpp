@@ -15,6 +15,7 @@
 #include "identification/validate.hpp"
 #include "support/arms.hpp"
 #include "support/measuring.hpp"
+#include "support/oriented_poses.hpp"
 #include "support/text_file.hpp"
 
 namespace {
@@ -170,23 +171,9 @@ std::vector<arms::Joints> one_orientation(const Robot& robot, std::size_t count)
   arms::Random random(5);
   std::vector<arms::Joints> poses;
   while (poses.size() < count) {
-    Eigen::Vector3d shift(random.around(0.2), random.around(0.2), random.around(0.2));
-    arms::Joints q = middle;
-    for (int k = 0; k < 50; ++k) {
-      const Pose<double> now = nominal_forward(*model, q);
-      Eigen::Matrix<double, 6, 1> e;
-      e << wanted.position + shift - now.position,
-          rotation_vector(wanted.rotation * now.rotation.transpose());
-      if (e.norm() < 1e-13) break;
-      const Eigen::Matrix<double, 6, 1> dq = jacobian(q).fullPivLu().solve(e);
-      for (std::size_t i = 0; i < 6; ++i) q[i] += std::clamp(dq[static_cast<Eigen::Index>(i)], -0.2, 0.2);
-    }
-    const Pose<double> now = nominal_forward(*model, q);
-    bool good = (wanted.position + shift - now.position).norm() < 1e-10;
-    for (std::size_t i = 0; i < 6; ++i) {
-      good = good && q[i] > robot.nominal.limits[i].min_rad && q[i] < robot.nominal.limits[i].max_rad;
-    }
-    if (good) poses.push_back(q);
+    Pose<double> shifted = wanted;
+    shifted.position += Eigen::Vector3d(random.around(0.2), random.around(0.2), random.around(0.2));
+    if (const auto q = oriented::reach(robot, *model, jacobian, middle, shifted)) poses.push_back(*q);
   }
   return poses;
 }
